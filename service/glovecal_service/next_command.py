@@ -40,7 +40,7 @@ def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> st
             return command
     residual = found.get("unexplained_residual") or {}
     if residual.get("is_significant"):
-        return f"glovecal where {short} --report where.html"
+        return f"glovecal where {short} --report where-{short}.html"
     if residual.get("not_identifiable"):
         return f"glovecal record GLOVE {FREE_MOTION} --seconds {LONG_ENOUGH_S}"
     return f"glovecal model activate {short}"

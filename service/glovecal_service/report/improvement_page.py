@@ -90,7 +90,7 @@ def _next(found: Mapping[str, Any]) -> str:
         return recording_command(following)
     if found["stopped"] == "noise_floor":
         return f"glovecal model activate {model}"
-    return f"glovecal where {model} --report where.html"
+    return f"glovecal where {model} --report where-{model}.html"
 
 
 def _card(added: Mapping[str, Any]) -> Markup:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+import shlex
 from functools import partial
 from pathlib import Path
 
@@ -59,13 +61,25 @@ def test_diagnose_names_shows_evidence_and_says_what_to_run(loop: tuple[Run, str
     assert "donning_shift: all takes are of one wearing" in lonely.out
 
 
-def test_an_effect_is_added_shown_and_taken_out(loop: tuple[Run, str, Path]) -> None:
+def test_one_command_after_the_other_as_each_prints_it(
+    loop: tuple[Run, str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     run, model, _ = loop
-    answer = run("add-effect", model, CAUSE, "-r", "I_PIP", "--activate")
-    assert answer.code == 0, answer.err
-    assert "reduces the held-out error" in answer.out
-    assert f", made from {model[:12]}. Active." in answer.out
-    child = answer.out.split("Model ")[1].split(",")[0]
+    answer, walked = run("diagnose", model), {}
+    while printed := re.search(r"^Next: glovecal (.*)$", answer.out, re.MULTILINE):
+        if "GLOVE" in printed[1] or printed[1] in walked:  # first somebody has to move a hand
+            break
+        answer = run(*shlex.split(printed[1]))
+        assert answer.code == 0, (printed[0], answer.err)
+        walked[printed[1]] = answer
+    verbs = [command.split()[0] for command in walked]
+    assert verbs == ["add-effect", "diagnose", "train", "diagnose", "add-effect", "diagnose", "where"]
+    assert "this is not a held-out error" in answer.err
+    added = next(iter(walked.values()))
+    assert "reduces the held-out error" in added.out
+    assert f", made from {model[:12]}. Not active; glovecal model activate" in added.out
+    child = added.out.split("Model ")[1].split(",")[0]
     shown = run("model", "show", child).out
     assert f"made from     {model[:12]}" in shown
     assert CAUSE in shown

@@ -46,7 +46,9 @@ def test_an_association_has_its_command():
     found["actions"] = [{**action, "saves": False}, {**action, "effect": None, "method": "lmc_gpr"}]
     assert next_command(MODEL, found, "pia") == "glovecal train --subject pia --method lmc_gpr"
     found["actions"] = [{**action, "saves": False}]
-    assert next_command(MODEL, found, "pia") == "glovecal where 0123456789ab --report where.html"
+    assert next_command(MODEL, found, "pia") == (
+        "glovecal where 0123456789ab --report where-0123456789ab.html"
+    )
 
 
 @pytest.mark.parametrize(

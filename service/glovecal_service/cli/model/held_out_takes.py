@@ -25,15 +25,23 @@ HeldOutTakes = Annotated[
 
 
 def held_out_takes(
-    service: RestClient, models: Sequence[dict[str, Any]], wanted: Sequence[str]
+    service: RestClient,
+    models: Sequence[dict[str, Any]],
+    wanted: Sequence[str],
+    *,
+    else_trained_on: bool = False,
 ) -> list[dict[str, Any]]:
-    """Rows of ``GET /takes``. Raises Refusal when a name is unknown, or when nothing is left to test with."""
+    """Rows of ``GET /takes``. Raises Refusal when a name is unknown, or when nothing is left to test with,
+    unless those ``else_trained_on`` will do."""
     if wanted:
         return find_takes(service.get("/takes"), wanted)
     subject, layout = models[0]["subject"], models[0]["layout"]
     rows = service.get("/takes", {"subject": subject, "layout": layout})
     trained = {take["id"] for document in models for take in document["facts"].get("takes", [])}
-    rows = [row for row in rows if row["rotations"] and row["id"] not in trained]
+    measured = [row for row in rows if row["rotations"]]
+    rows = [row for row in measured if row["id"] not in trained]
+    if not rows and else_trained_on and measured:
+        return measured
     if not rows:
         raise Refusal(
             f"every take of {subject} with layout {layout} and reference angles was trained on, so none can "
@@ -44,9 +52,9 @@ def held_out_takes(
 
 def warn_trained_on(model: str, trained_on: Sequence[str], takes: Sequence[dict[str, Any]]) -> None:
     """Say which of ``takes`` the model has seen before."""
-    names = {row["id"]: row["name"] for row in takes}
-    for id in trained_on:
+    names = [row["name"] for row in takes if row["id"] in trained_on]
+    if names:
+        of = "all of them" if len(names) == len(takes) > 1 else f"take {', '.join(names)}"
         err.print(
-            f"Careful: model {model[:12]} was trained on take {names[id]}; this is not a held-out error.",
-            style="yellow",
+            f"Careful: model {model[:12]} was trained on {of}; this is not a held-out error.", style="yellow"
         )

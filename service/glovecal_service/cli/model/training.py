@@ -98,6 +98,8 @@ def _say_job(job: dict[str, Any], as_json: bool) -> None:
 
 
 def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
+    from glovecal_models.calibration.training_settings import OF_SHAPES
+
     for sentence in result.get("sentences", []):
         err.print(sentence)
     error = result.get("held_out_rmse_deg")
@@ -112,6 +114,8 @@ def _say_model(result: dict[str, Any], document: dict[str, Any]) -> None:
         f"Model {document['id'][:12]} ({document['method']}) for {document['subject']}, {told}. {active}"
     )
     print_sentences((document["unseen_wearing"] or {}).get("sentences", ()))
+    if document["method"] not in OF_SHAPES:
+        out.print(f"Next: glovecal diagnose {document['id'][:12]}")
 
 
 def _choose(

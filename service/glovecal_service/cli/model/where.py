@@ -63,7 +63,7 @@ def where(
         require_place(report, overwrite=overwrite)
     with connect() as service:
         document = service.get(f"/models/{model}")
-        takes = held_out_takes(service, [document], take or [])
+        takes = held_out_takes(service, [document], take or [], else_trained_on=True)
         body = {"takes": [row["id"] for row in takes], "cross_validation": cross_validation}
         if ceiling:
             wait_for_ceiling(service, model, quiet=as_json)
