@@ -122,7 +122,7 @@ def test_a_refusal_is_passed_on_and_a_mistake_is_called_one(dispatched, ledger):
     assert unknown.error == f"no job of kind 'knit'; there are {kinds}"
 
 
-def test_a_process_that_cannot_start_is_told_in_its_own_words(
+def test_a_process_that_cannot_start_is_told_and_its_own_words_are_logged(
     sqlite_store, sqlite_settings, ledger, tmp_path
 ):
     """Whatever breaks it: here a package that only children import."""
@@ -132,10 +132,12 @@ def test_a_process_that_cannot_start_is_told_in_its_own_words(
     job = create(sqlite_store, ledger, [1])
     program = Path(jobs_process.__file__)
     command = [sys.executable, str(program), str(sqlite_settings.data), "", str(broken)]
-    assert subprocess.run(command, capture_output=True, timeout=500).returncode == 0
-    assert error_of(sqlite_store, job.id).endswith(
-        "Nanny failed to start: ValueError: the installation is damaged"
-    )
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0
+    told = error_of(sqlite_store, job.id)
+    assert "they cannot import what they need; install Glovecal again" in told
+    assert "the installation is damaged" not in told
+    assert "ValueError: the installation is damaged" in done.stderr, "the log has it"
 
 
 def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):

@@ -25,6 +25,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from glovecal_client.errors import reason_of
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.dask_log import silence_dask
 from glovecal_service.jobs.job_kind import Task
@@ -34,6 +35,8 @@ from glovecal_service.settings import Settings
 
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster, Security
+
+_log = logging.getLogger("glovecal.jobs")
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
@@ -225,18 +228,22 @@ def _security(settings: Settings) -> Security:
 
 
 def _reason(error: Exception) -> str:
-    """Why no process starts, in the words of the process where Dask only says "Nanny failed to start".
+    """Why no process starts; what Dask and Python say of it is for the log.
 
     One that dies before it can speak to Dask writes why to standard error: what it imports is imported once
     more to hear that.
     """
-    if not isinstance(error, RuntimeError):
-        return str(error) or type(error).__name__
-    cause = "" if error.__cause__ is None else str(error.__cause__)
+    _log.warning("no training process can be started", exc_info=error)
+    if isinstance(error, TimeoutError):
+        return f"none answered within {START_TIMEOUT_S} s"
+    if isinstance(error, OSError):
+        return reason_of(error)
     command = [sys.executable, "-P", "-c", "import " + ", ".join(_IMPORTED_ONCE)]
     child = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
-    said = child.stderr.strip().splitlines()[-1:] if child.returncode else [cause]
-    return ": ".join(part for part in (str(error).rstrip("."), *said) if part)
+    if child.returncode == 0:
+        return "they end while they start; the service's log says more"
+    _log.warning("what a training process imports: %s", child.stderr.strip())
+    return "they cannot import what they need; install Glovecal again (the log says what is missing)"
 
 
 LOOP_IS_CLOSED = "IOLoop is closed"
