@@ -5,6 +5,7 @@ And what they must not see: how this computer and the shell that began them are 
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import signal
@@ -93,6 +94,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         path: (number + 0.5) / len(paths) for paths in kinds.values() for number, path in enumerate(paths)
     }
     items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
+
+
+def pytest_collection_finish() -> None:
+    """What was imported until now stays: the garbage collector looked through it again and again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 def _tell_warnings_of_others(config: pytest.Config) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_running import Answer, Run, simulated
+from cli_running import Answer, Run, glovecal, simulated
 from still_take import still_take
 
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
@@ -22,9 +23,11 @@ I_PIP = ["I_PIP"]
 """
 
 
-@pytest.fixture
-def eve(run: Run, tmp_path: Path) -> Run:
+@pytest.fixture(scope="module")
+def eve(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """A subject whose layout does not know yet that knuckles stretch the sensor between the fingers."""
+    tmp_path = tmp_path_factory.mktemp("eve")
+    run = partial(glovecal, {"GLOVECAL_DATA": str(tmp_path / "data")})
     glove = SimulatedGlove(1)
     still = [
         still_take(glove, "IM_ABD", ("I_MCP", "M_MCP"), name="still-IM_ABD", rate_hz=30),
@@ -89,7 +92,7 @@ def test_json_and_a_choice_of_proposals(eve: Run) -> None:
     assert document["counts"] == [1, 255]
 
 
-def test_what_cannot_be_examined_is_refused(eve: Run, run: Run) -> None:
+def test_what_cannot_be_examined_is_refused(eve: Run) -> None:
     def refused(*arguments: object) -> Answer:
         answer = eve("take", "examine", *arguments)
         assert answer.code in (1, 2)
