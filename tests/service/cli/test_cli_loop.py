@@ -21,10 +21,14 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, str, Path]:
     folder = tmp_path_factory.mktemp("loop")
     run = partial(glovecal, {"GLOVECAL_DATA": str(folder / "data")})
     run("subject", "add", "anna")
-    imported = run("take", "import", write_sticky(folder), "-s", "anna")
+    table = write_sticky(folder)
+    imported = run("take", "import", table, "-s", "anna")
     assert imported.code == 0, imported.err
+    assert "Next: glovecal train --subject anna\n" in imported.out
     options = ("--method", "linear", "--folds", "0", "--json")
-    return run, run("train", "-s", "anna", *options).json["result"]["model"], folder
+    model = run("train", "-s", "anna", *options).json["result"]["model"]
+    assert "Next" not in run("take", "import", table, "-s", "anna").out, "it was trained on them all"
+    return run, model, folder
 
 
 def test_the_catalogue_in_words_and_one_effect_in_full(anna: Run) -> None:
@@ -164,3 +168,13 @@ def test_improve_without_anything_to_learn_from(run: Run, loop: tuple[Run, str, 
     mute = run("improve", "--takes", folder / "mute.csv")
     assert mute.code == 1
     assert "mute.csv" in mute.said
+
+
+def test_takes_that_the_model_has_not_seen_are_held_against_it(
+    loop: tuple[Run, str, Path], tmp_path: Path
+) -> None:
+    run, model, _ = loop
+    write_takes([sticky_session().also("natural", 12, 1, repeat=1).take], tmp_path / "new.csv")
+    imported = run("take", "import", tmp_path / "new.csv", "-s", "anna")
+    assert f"Next: glovecal compare {model[:12]}\n" in imported.out
+    assert run("compare", model[:12]).code == 0

@@ -13,7 +13,7 @@ from glovecal_service.cli.take.files import ImportWarnings, added_subject, frame
 from glovecal_service.cli.take.rows import print_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Subject
-from glovecal_service.cli.terminal.printing import err, print_json
+from glovecal_service.cli.terminal.printing import err, out, print_json
 from glovecal_service.cli.terminal.refusal import REFUSED, sentence_of
 
 if TYPE_CHECKING:
@@ -73,13 +73,33 @@ def import_takes(
                     raise
                 refused += 1
                 err.print(f"{file}: not imported: {sentence_of(error)}", style="red")
+        following = None if as_json or refused else _next(service, subject, rows)
     warnings.print()
     if as_json:
         print_json(rows)
     elif rows or not refused:
         print_takes(rows, empty="Nothing was imported.")
+    if following:
+        out.print(f"Next: {following}")
     if refused:
         raise typer.Exit(REFUSED)
+
+
+def _next(service: RestClient, subject: str, rows: list[dict[str, Any]]) -> str | None:
+    """Train with takes that teach, or hold the active model against those it has not seen."""
+    teaching = [row for row in rows if row["teaches"]]
+    if not teaching:
+        return None
+    layout = teaching[0]["layout"]
+    models = service.get("/models", {"subject": subject, "layout": layout})
+    active = next((model for model in models if model["active"]), None)
+    if active is not None:
+        seen = {take["id"] for take in active["facts"].get("takes", [])}
+        is_new = any(row["id"] not in seen for row in teaching)
+        return f"glovecal compare {active['id'][:12]}" if is_new else None
+    every = service.get("/takes", {"subject": subject})
+    others = any(row["teaches"] and row["layout"] != layout for row in every)
+    return f"glovecal train --subject {subject}" + (f" --layout {layout}" if others else "")
 
 
 def _import(
