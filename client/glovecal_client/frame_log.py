@@ -8,6 +8,7 @@ again at once and kept in memory, in order, until there is room.
 from __future__ import annotations
 
 import errno
+import os
 import threading
 from collections import deque
 from collections.abc import Mapping
@@ -44,18 +45,26 @@ class FrameLog:
 
     @classmethod
     def create(cls, path: Path | str, meta: Mapping[str, Any]) -> FrameLog:
-        """A new log. Raises FileExistsError, OSError (no folder, disk full), ValueError (meta is no JSON)."""
+        """A new log. Raises FileExistsError, OSError (no folder, disk full), ValueError (meta is no JSON).
+
+        It has its header before it has its name: whoever finds it can read it.
+        """
         path = Path(path)
         head = header_bytes(meta)
-        file = FileIO(path, "xb", opener=open_private)
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        unnamed = path.with_name(f"{path.name}.new")
         try:
-            if file.write(head) != len(head):
-                raise OSError(errno.ENOSPC, f"{path}: no room for the header")
-            sync_file(file)
+            with FileIO(unnamed, "wb", opener=open_private) as file:
+                if file.write(head) != len(head):
+                    raise OSError(errno.ENOSPC, f"{path}: no room for the header")
+                sync_file(file)
+            unnamed.replace(path)
         except OSError:
-            file.close()
-            path.unlink()
+            unnamed.unlink(missing_ok=True)
             raise
+        file = FileIO(path, "r+b")
+        file.seek(len(head))
         return cls(path, file, dict(meta), 0, len(head))
 
     @classmethod

@@ -5,8 +5,10 @@ from __future__ import annotations
 import resource
 import subprocess
 import sys
+import threading
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -114,6 +116,26 @@ def test_an_existing_log_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         FrameLog.create(tmp_path / "log", META)
     assert (tmp_path / "log").read_bytes() == content
+
+
+def test_whoever_finds_a_log_can_read_it(tmp_path: Path) -> None:
+    """It is never there without its header, however often somebody looks."""
+    over, seen = threading.Event(), set[Path]()
+
+    def look() -> None:
+        while not over.is_set():
+            for log in tmp_path.glob("*.glvlog"):
+                assert Recording.open(log).meta == {"glove": "g"}
+                seen.add(log)
+
+    with ThreadPoolExecutor(1) as pool:
+        looking = pool.submit(look)
+        for number in range(300):
+            FrameLog.create(tmp_path / f"{number}.glvlog", {"glove": "g"}).close()
+        eventually(lambda: len(seen) == 300 or looking.done(), "all are read")
+        over.set()
+        looking.result()
+    assert sorted(tmp_path.iterdir()) == sorted(seen)
 
 
 def test_header_that_is_not_json_is_damage(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ from realtime_support import eventually
 from glovecal_client import Recording, open_router
 from glovecal_client.capture.command import main as capture_alone
 from glovecal_client.capture.command import parse_options, run_capture
-from glovecal_client.errors import DamagedLog
 from glovecal_service.emulators.catalogue import PROTOCOLS
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3, card_file
 
@@ -62,10 +61,7 @@ def stop_after(count: int, data: Path, stop: threading.Event) -> None:
     """Set ``stop`` once so many frames are in the log of the capture that writes to ``data``."""
 
     def frames(log: Path) -> int:
-        try:
-            return len(list(Recording.open(log).frames()))
-        except DamagedLog:  # created, and its header not written yet
-            return 0
+        return len(list(Recording.open(log).frames()))
 
     try:
         eventually(lambda: any(frames(log) > count for log in data.rglob("*.glvlog")), "frames")

@@ -68,8 +68,8 @@ def test_stopped_while_the_recorder_is_away(
             process.kill()
             process.join()
         time.sleep(away_s)
-        store.recordings.stop(id)
         stopped_ns = time.time_ns()
+        store.recordings.stop(id)
         time.sleep(0.3)
         with recording_thread(settings):
             record = settled(store, id)
@@ -100,8 +100,8 @@ def test_while_capture_is_away_too_it_is_incomplete_and_repaired_as_soon_as_it_i
         with capture_process(settings) as capture:
             eventually(lambda: len(logged(settings)) == 2, "a second run")
             time.sleep(0.3)
-            store.recordings.stop(id)
             stopped_ns = time.time_ns()
+            store.recordings.stop(id)
             time.sleep(0.3)
             kill(capture)
         with recording_thread(settings):
@@ -131,8 +131,8 @@ def test_capture_that_ended_by_itself_needs_no_repair(settings: Settings, store:
         with capturing(settings):
             id = begun(store, "ended")
             time.sleep(0.3)
-        store.recordings.stop(id)
         stopped_ns = time.time_ns()
+        store.recordings.stop(id)
         record = settled(store, id)
     check_law(settings, record, stopped_ns)
     assert record.facts["missing"] == []
