@@ -93,7 +93,7 @@ def told_wrongly(hidden: HiddenSession, found: Findings) -> list[str]:
     """What was told beside the first name and is not so; each as the end of a sentence.
 
     The references are right, and no second effect is hidden. That something is left is right where the error
-    is more than a healthy glove's.
+    of a rotation is more than a healthy glove's.
     """
     truth, wrong = hidden.truth, []
     for when, diagnosis in (("", found.diagnosis), (" afterwards", found.diagnosis_after or {})):
@@ -108,13 +108,19 @@ def told_wrongly(hidden: HiddenSession, found: Findings) -> list[str]:
         wrong.append("an unexplained residual was reported of a healthy glove")
     is_catalogued = truth is not None and not truth.name.startswith("unknown:")
     again, floor, errors = found.diagnosis_after, floor_deg(found), errors_deg(found)
-    if again is not None and is_catalogued and again["unexplained_residual"]["is_significant"]:
-        most = DIAGNOSIS_LIMITS.healthy_floors * (floor or 0.0)
-        if errors.get("with_effect", 0.0) <= most:
-            wrong.append("an unexplained residual was reported afterwards, of an error as in healthy gloves")
+    is_said = again is not None and again["unexplained_residual"]["is_significant"]
+    if is_said and is_catalogued and not _is_anything_left(found):
+        wrong.append("an unexplained residual was reported afterwards, of an error as in healthy gloves")
     if floor is not None and min(errors.values()) < floor:
         wrong.append("an error was told that lies below its noise floor")
     return list(dict.fromkeys(wrong))
+
+
+def _is_anything_left(found: Findings) -> bool:
+    """Whether the error of the last model is more than a healthy glove's, in all or of one rotation."""
+    compared = [found.last["overall"], *found.last["rotations"].values()]
+    most = DIAGNOSIS_LIMITS.healthy_floors
+    return any(item["rmse_deg"] > most * item["floor"]["floor_deg"] for item in compared if item["floor"])
 
 
 def is_right(hidden: HiddenSession, found: Findings) -> bool:

@@ -107,7 +107,8 @@ def test_what_is_told_beside_the_first_name_and_is_not_so_is_called_wrong():
     loud = quiet | {"unexplained_residual": {"is_significant": True}}
 
     def errors(rmse_deg: float) -> dict:
-        return {"overall": {"rmse_deg": rmse_deg, "floor": {"floor_deg": 0.6, "is_lower_bound": False}}}
+        overall = {"rmse_deg": rmse_deg, "floor": {"floor_deg": 0.6, "is_lower_bound": False}}
+        return {"overall": overall, "rotations": {"I_PIP": dict(overall)}}
 
     named = {"effect": "lag", "confidence_set": ["lag"]}
     found = Findings(
@@ -123,6 +124,8 @@ def test_what_is_told_beside_the_first_name_and_is_not_so_is_called_wrong():
     assert wrong[:3] == [f"{problem!r} was told", "sensor_fault was found", "creep was named afterwards"]
     assert "of an error as in healthy gloves" in wrong[3]
     assert verdict(hidden, found)[-4:] == [f"Wrong: {said}." for said in wrong]
+    found.comparisons["with_effect"]["rotations"]["I_PIP"]["rmse_deg"] = 1.0
+    assert len(told_wrongly(hidden, found)) == 3, "of one rotation something is left"
     found.comparisons["with_effect"] = errors(1.5)
     assert len(told_wrongly(hidden, found)) == 3, "an error of 2.5 noise floors: something is left"
     found.comparisons["with_effect"] = errors(0.5)
