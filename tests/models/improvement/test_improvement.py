@@ -61,10 +61,11 @@ def test_a_childs_error_is_of_all_rotations_wherever_the_effect_is(sticky, added
     assert "rmse_deg" not in added.model.error_estimate, "the parent's other rotations were not measured"
     whole = train(sticky.takes, LAYOUT, "anna", SETTINGS)
     child = add_effect(whole, sticky.takes, "hysteresis", rotations=["I_PIP"], settings=SETTINGS)
+    assert child.of_all_deg is not None
     parent_deg, child_deg = child.of_all_deg
     assert parent_deg == whole.error_estimate["rmse_deg"]
     assert child_deg == child.model.error_estimate["rmse_deg"]
-    errors = [each.held_out_rmse_deg for each in child.model.rotations]
+    errors = [each.held_out_rmse_deg or np.nan for each in child.model.rotations]
     assert child_deg == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.02)
     assert child_deg < child.after.rmse_deg("I_PIP")
 

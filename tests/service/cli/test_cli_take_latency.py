@@ -111,6 +111,7 @@ def test_taps_on_a_key_measure_the_glove_and_live_poses_say_so(settings, session
     before = eventually(lambda: _meta(session, keys), "pose meta")
     assert before["glove_latency_s"] is None
     reach = {"GLOVECAL_DATA": str(settings.data), "GLOVECAL_ZENOH": settings.zenoh}
+    code, said = -1, ""
     for _ in range(5):
         code, said = _tap_in_a_terminal(reach, tapped)
         if code == 0 or "taps are alike" not in said:
