@@ -18,7 +18,7 @@ from typing import Any
 
 from glovecal_client.errors import reason_of
 from glovecal_client.log_records import cut_damaged_tail, good_end, header_bytes, record_bytes
-from glovecal_client.operating_system import sync_file
+from glovecal_client.operating_system import move_over, remove, sync_file
 from glovecal_client.private_files import open_private
 
 MAX_WAITING = 7200
@@ -59,9 +59,9 @@ class FrameLog:
                 if file.write(head) != len(head):
                     raise OSError(errno.ENOSPC, f"{path}: no room for the header")
                 sync_file(file)
-            unnamed.replace(path)
+            move_over(unnamed, path)
         except OSError:
-            unnamed.unlink(missing_ok=True)
+            remove(unnamed)
             raise
         file = FileIO(path, "r+b")
         file.seek(len(head))

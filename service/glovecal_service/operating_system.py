@@ -16,6 +16,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import select
+import shlex
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import IO
 
 from glovecal_client.clock import clock_s
@@ -159,3 +161,8 @@ def _pressed_in_console(timeout_s: float) -> str:
         msvcrt.getwch()
         return ""
     return key
+
+
+def as_typed(file: Path) -> str:
+    """The name of a file as it is typed at the end of a command: a folder's name may have blanks."""
+    return subprocess.list2cmdline([str(file)]) if sys.platform == "win32" else shlex.quote(str(file))

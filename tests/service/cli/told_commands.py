@@ -94,7 +94,8 @@ def _text(node: ast.AST) -> str:
 
 def _sample(expression: str) -> str:
     words = re.findall(r"\w+", expression)
-    return next((SAMPLES[word] for word in reversed(words) if word in SAMPLES), "W1")
+    sample = next((SAMPLES[word] for word in reversed(words) if word in SAMPLES), "W1")
+    return shlex.quote(sample) if "as_typed" in words else sample
 
 
 def with_samples(line: str) -> str:

@@ -158,8 +158,8 @@ def test_it_ends_where_somebody_said_who_wears_the_glove(settings: Settings, sto
     with open_router([settings.zenoh]), capturing(settings), recording_thread(settings):
         captured(settings, 300)
         store.subjects.create("ben")
-        store.gloves.assign(GLOVE, "ben", "after lunch")
         said_at = time.monotonic()
+        store.gloves.assign(GLOVE, "ben", "after lunch")
         time.sleep(0.5)
         asked = store.recordings.request(GLOVE, name="another wearing")
         recorded(store, asked.id, 50)

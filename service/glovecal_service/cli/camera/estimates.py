@@ -28,6 +28,7 @@ from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import progress_bar
+from glovecal_service.operating_system import as_typed
 
 if TYPE_CHECKING:
     from glovecal_service.camera.recorded_estimates import TrackedRecordings
@@ -138,7 +139,7 @@ def _print(found: TrackedRecordings, file: Path) -> None:
     print_table(rows, columns, empty="")
     drawn = " The pictures were rendered: the estimates are marked as simulated." if said.simulated else ""
     out.print(f"{100 * said.accepted.mean():.0f} % of all angles are accepted. Wrote {file}.{drawn}")
-    out.print(f"Next: glovecal take camera TAKE {file}")
+    out.print(f"Next: glovecal take camera TAKE {as_typed(file)}")
 
 
 def _degrees(value: float | None) -> str:

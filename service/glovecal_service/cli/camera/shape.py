@@ -24,6 +24,7 @@ from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import progress_bar
+from glovecal_service.operating_system import as_typed
 
 SUFFIX = ".json"
 
@@ -120,4 +121,4 @@ def shape(
             f"One camera leaves the size open by {100 * found.size_sd:.0f} %: distances from the camera are "
             "as uncertain, angles are not."
         )
-    out.print(f"Wrote {file}. Next: glovecal camera track SOURCE --glove GLOVE --shape {file}")
+    out.print(f"Wrote {file}. Next: glovecal camera track SOURCE --glove GLOVE --shape {as_typed(file)}")
