@@ -8,7 +8,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from typing import Any
@@ -80,17 +81,27 @@ def _require_runnable(said: str) -> None:
         assert complaint(with_samples(line)) is None, line
 
 
-def start(settings: Mapping[str, str], *arguments: object, **options: Any) -> subprocess.Popen[str]:
+class Started(subprocess.Popen[str]):
+    """Its standard error goes to a file: a pipe that nobody reads is full after some hundred lines of a log,
+    and then the process stands still."""
+
+    def __init__(self, command: Sequence[str], **options: Any) -> None:
+        self._file, self._complaints = tempfile.TemporaryFile(), ""  # noqa: SIM115  # closed by communicate
+        super().__init__(command, stdout=subprocess.PIPE, stderr=self._file, text=True, **options)
+
+    def communicate(self, input: str | None = None, timeout: float | None = None) -> tuple[str, str]:
+        out, _ = super().communicate(input, timeout)
+        if not self._file.closed:
+            self._file.seek(0)
+            self._complaints = self._file.read().decode(errors="replace")
+            self._file.close()
+        return out, self._complaints
+
+
+def start(settings: Mapping[str, str], *arguments: object, **options: Any) -> Started:
     """Run a verb as a process that leads a session of its own, as from a terminal."""
-    return subprocess.Popen(
-        [*COMMAND, *map(str, arguments)],
-        env=environment(settings),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        **options,
-    )
+    command = [*COMMAND, *map(str, arguments)]
+    return Started(command, env=environment(settings), start_new_session=True, **options)
 
 
 @contextmanager
