@@ -6,17 +6,24 @@ terminal is gone.
 
 from __future__ import annotations
 
+import atexit
 import errno
 import io
 import os
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
+from queue import Full, Queue
+from threading import Thread
 from typing import Any, NoReturn, TextIO
 
 READER_GONE = (errno.EPIPE, errno.EIO, errno.EINVAL)
 """A closed pipe (EINVAL on Windows), a terminal that hung up: nobody is left to be told."""
 ANSWER_LOST = 1
+MOST_WAITING = 2000
+"""Lines that nobody has read yet."""
+SETTLED_WITHIN_S = 1.0
 
 
 class AnswerLost(BrokenPipeError):
@@ -60,6 +67,25 @@ def guard_streams() -> None:
     sys.stdin = sys.stdin or open(0, closefd=False, encoding="locale")  # noqa: SIM115
     sys.stdout = _guarded(sys.stdout or open(1, "w", closefd=False, encoding="locale"), _lose_answer)  # noqa: SIM115
     sys.stderr = _guarded(sys.stderr or open(2, "w", closefd=False, encoding="locale"), _ignore)  # noqa: SIM115
+
+
+def never_wait() -> None:
+    """From now on nothing waits for standard error, which a thread of its own writes.
+
+    Its reader may stand still: a pipe that nobody empties, a terminal stopped by Ctrl-S, a Windows console in
+    which somebody marks text. Lines then wait in memory; when there are too many the newest are left out, and
+    that is told as soon as somebody reads again. For processes that must go on: lines may come out after what
+    was printed later on standard output. Nothing changes where ``guard_streams`` was not called: the stream
+    is not ours.
+    """
+    stream = sys.stderr
+    if not isinstance(getattr(getattr(stream, "buffer", None), "raw", None), _Guard):
+        return
+    raw = _Patient(stream)
+    sys.stderr = io.TextIOWrapper(
+        io.BufferedWriter(raw), encoding=stream.encoding, errors=stream.errors, line_buffering=True
+    )
+    atexit.register(raw.settle)
 
 
 def say(sentence: str) -> None:
@@ -111,6 +137,53 @@ class _Guard(io.RawIOBase):
 
     def isatty(self) -> bool:
         return self._raw.isatty()
+
+
+class _Patient(io.RawIOBase):
+    """The raw end of ``stream``: writing takes no time."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream  # which would close the raw one
+        self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
+        self._waiting: Queue[bytes] = Queue(MOST_WAITING)
+        self._left_out = 0
+        Thread(target=self._write_on, name="standard error", daemon=True).start()
+
+    def write(self, data: Any, /) -> int:
+        try:
+            self._waiting.put_nowait(bytes(data))
+        except Full:
+            self._left_out += 1
+        return len(data)
+
+    def settle(self) -> None:
+        """Wait until all is written, but not for a reader that stands still."""
+        until = time.monotonic() + SETTLED_WITHIN_S
+        while self._waiting.unfinished_tasks and time.monotonic() < until:
+            time.sleep(0.01)
+
+    def _write_on(self) -> None:
+        while True:
+            data = self._waiting.get()
+            if left_out := self._left_out:
+                self._left_out = 0
+                data += f"({left_out} lines were left out here: nobody read them.)\n".encode()
+            with suppress(OSError, ValueError):
+                while data:  # past the buffer, whose lock would be held when the process ends
+                    written = self._raw.write(data)
+                    data = data[written or 0 :]
+                    if not written:  # a pipe that does not block, and is full
+                        time.sleep(0.01)
+            self._waiting.task_done()
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        return self._stream.fileno()
+
+    def isatty(self) -> bool:
+        return self._stream.isatty()
 
 
 def _guarded(stream: TextIO, failed: Callable[[OSError], None]) -> TextIO:

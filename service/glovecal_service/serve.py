@@ -27,7 +27,7 @@ from typing import Any, Protocol
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
 from glovecal_client.signals import handle_signals, leave_signals_to_the_parent
-from glovecal_client.standard_streams import say
+from glovecal_client.standard_streams import guard_streams, never_wait, say
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
@@ -284,6 +284,7 @@ def _stop(parts: list[Part], lifeline: Lifeline) -> None:
 
 def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
     """What a child does first: see to it that it stops when asked, and when the parent is gone."""
+    guard_streams()
     _log_to_stderr()
     keep_private()
     stopped = Event()
@@ -340,6 +341,7 @@ def _follow_server(server: Any, stopped: Event, started: Callable[[], None]) -> 
 
 
 def _log_to_stderr() -> None:
+    never_wait()
     logging.basicConfig(
         stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s"
     )

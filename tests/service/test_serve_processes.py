@@ -60,6 +60,23 @@ def serving(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str, int]]:
         process.communicate(timeout=120)
 
 
+def test_a_log_that_nobody_reads_holds_nobody_up(serving: tuple[subprocess.Popen[str], str, int]) -> None:
+    """Its pipe is full after some hundred requests."""
+    _, endpoint, port = serving
+    eventually(lambda: answers(endpoint), "real time")
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}/v1", timeout=60.0) as http:
+        eventually(lambda: _is_up(http), "the web process")
+        for _ in range(600):
+            assert http.get("/health/live").is_success
+
+
+def _is_up(http: httpx.Client) -> bool:
+    try:
+        return http.get("/health/live").is_success
+    except httpx.TransportError:
+        return False
+
+
 def children(process: subprocess.Popen[str]) -> list[int]:
     return [child.pid for child in psutil.Process(process.pid).children()]
 

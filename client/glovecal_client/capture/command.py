@@ -23,7 +23,7 @@ from glovecal_client.names import check_identifier, subject_name
 from glovecal_client.private_files import keep_private
 from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_client.signals import stopped_by_signals
-from glovecal_client.standard_streams import run_command, say
+from glovecal_client.standard_streams import never_wait, run_command, say
 
 UNIT_LOG_LIMIT = 8_000_000_000
 """Bytes that capture at boot keeps, five days at 120 Hz."""
@@ -98,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _capture(asked: argparse.Namespace) -> None:
     """One run after another, each ended by the limit of its log; the last by a signal or the device."""
     stop, is_over = threading.Event(), False
+    never_wait()
     with stopped_by_signals(stop, outlives_terminal=True):
         while not is_over:
             summary = run_capture(

@@ -52,9 +52,10 @@ def capture(
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
     from glovecal_client.capture.command import parse_options, run_capture, tell
     from glovecal_client.signals import stopped_by_signals
-    from glovecal_client.standard_streams import say
+    from glovecal_client.standard_streams import never_wait, say
 
     keep_private()
+    never_wait()
     stop = threading.Event()
     with stopped_by_signals(stop, outlives_terminal=True):
         summary = run_capture(
