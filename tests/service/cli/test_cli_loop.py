@@ -173,8 +173,9 @@ def test_improve_without_anything_to_learn_from(run: Run, loop: tuple[Run, str, 
 def test_takes_that_the_model_has_not_seen_are_held_against_it(
     loop: tuple[Run, str, Path], tmp_path: Path
 ) -> None:
-    run, model, _ = loop
+    run, _, _ = loop
     write_takes([sticky_session().also("natural", 12, 1, repeat=1).take], tmp_path / "new.csv")
     imported = run("take", "import", tmp_path / "new.csv", "-s", "anna")
-    assert f"Next: glovecal compare {model[:12]}\n" in imported.out
-    assert run("compare", model[:12]).code == 0
+    (active,) = [row["id"] for row in run("model", "list", "--json").json if row["active"]]
+    assert f"Next: glovecal compare {active[:12]}\n" in imported.out
+    assert run("compare", active[:12]).code == 0
