@@ -81,7 +81,7 @@ def never_wait() -> None:
     stream = sys.stderr
     if not isinstance(getattr(getattr(stream, "buffer", None), "raw", None), _Guard):
         return
-    raw = _Patient(stream)
+    raw = _Patient(stream, _ignore)
     sys.stderr = io.TextIOWrapper(
         io.BufferedWriter(raw), encoding=stream.encoding, errors=stream.errors, line_buffering=True
     )
@@ -139,51 +139,46 @@ class _Guard(io.RawIOBase):
         return self._raw.isatty()
 
 
-class _Patient(io.RawIOBase):
-    """The raw end of ``stream``: writing takes no time."""
+class _Patient(_Guard):
+    """One that takes no time: a thread writes, past the stream's buffer: its lock is wanted at the end."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream  # which would close the raw one
-        self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
+    def __init__(self, stream: TextIO, failed: Callable[[OSError], None]) -> None:
+        super().__init__(stream, failed)
         self._waiting: Queue[bytes] = Queue(MOST_WAITING)
         self._left_out = 0
         Thread(target=self._write_on, name="standard error", daemon=True).start()
 
     def write(self, data: Any, /) -> int:
         try:
+            self._tell_left_out()
             self._waiting.put_nowait(bytes(data))
         except Full:
             self._left_out += 1
         return len(data)
 
+    def _tell_left_out(self) -> None:
+        if self._left_out:
+            told = f"({self._left_out} lines were left out here: nobody read them.)\n"
+            self._waiting.put_nowait(told.encode())
+            self._left_out = 0
+
     def settle(self) -> None:
         """Wait until all is written, but not for a reader that stands still."""
         until = time.monotonic() + SETTLED_WITHIN_S
-        while self._waiting.unfinished_tasks and time.monotonic() < until:
+        while (self._waiting.unfinished_tasks or self._left_out) and time.monotonic() < until:
+            with suppress(Full):
+                self._tell_left_out()
             time.sleep(0.01)
 
     def _write_on(self) -> None:
         while True:
             data = self._waiting.get()
-            if left_out := self._left_out:
-                self._left_out = 0
-                data += f"({left_out} lines were left out here: nobody read them.)\n".encode()
-            with suppress(OSError, ValueError):
-                while data:  # past the buffer, whose lock would be held when the process ends
-                    written = self._raw.write(data)
-                    data = data[written or 0 :]
-                    if not written:  # a pipe that does not block, and is full
-                        time.sleep(0.01)
+            while data:
+                written = super().write(data)
+                data = data[written or 0 :]
+                if not written:  # a pipe that does not block, and is full
+                    time.sleep(0.01)
             self._waiting.task_done()
-
-    def writable(self) -> bool:
-        return True
-
-    def fileno(self) -> int:
-        return self._stream.fileno()
-
-    def isatty(self) -> bool:
-        return self._stream.isatty()
 
 
 def _guarded(stream: TextIO, failed: Callable[[OSError], None]) -> TextIO:

@@ -42,7 +42,7 @@ def command():
         print(f"line {{number:05d}} {{'.' * 80}}", file=sys.stderr)
     print("done", flush=True)
     sys.stdin.readline()
-    print("last", file=sys.stderr)
+    print("line last", file=sys.stderr)
 
 run_command(command)
 """
@@ -62,8 +62,7 @@ def test_a_process_goes_on_though_nobody_reads_what_it_complains_of() -> None:
     assert process.returncode == 0
     assert lines[0].startswith("line 00000 ")
     left_out = re.findall(r"^\((\d+) lines were left out here", complaints, re.MULTILINE)
-    assert sum(line.startswith("line ") for line in lines) + sum(map(int, left_out)) == LINES
-    assert lines[-1] == "last"
+    assert sum(line.startswith("line ") for line in lines) + sum(map(int, left_out)) == LINES + 1
 
 
 def test_it_ends_though_nobody_reads() -> None:

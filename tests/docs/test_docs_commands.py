@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 
-from glovecal_service.cli.command import app
+from glovecal_service.cli.command import command
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -24,7 +23,7 @@ OF_DO_PY["--confusion"] = "client/examples/spell.py"
 OF_DO_PY["--shapes"] = "tests/study/tracked_errors.py"
 CAPTURE = "client/glovecal_client/capture/command.py"
 OF_DO_PY |= dict.fromkeys(("--install-unit", "--log-limit"), CAPTURE)  # of glovecal-capture alone
-COMMAND = typer.main.get_command(app)
+COMMAND: Any = command()
 
 
 def test_the_readme_is_read_in_one_go() -> None:

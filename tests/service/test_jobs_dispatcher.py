@@ -135,7 +135,7 @@ def test_a_process_that_cannot_start_is_told_and_its_own_words_are_logged(
     done = subprocess.run(command, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0
     told = error_of(sqlite_store, job.id)
-    assert "they cannot import what they need; install Glovecal again" in told
+    assert "none can import what it needs; install Glovecal again" in told
     assert "the installation is damaged" not in told
     assert "ValueError: the installation is damaged" in done.stderr, "the log has it"
 

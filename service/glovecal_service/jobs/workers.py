@@ -241,9 +241,9 @@ def _reason(error: Exception) -> str:
     command = [sys.executable, "-P", "-c", "import " + ", ".join(_IMPORTED_ONCE)]
     child = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if child.returncode == 0:
-        return "they end while they start; the service's log says more"
+        return "each ends while it starts; the service's log says more"
     _log.warning("what a training process imports: %s", child.stderr.strip())
-    return "they cannot import what they need; install Glovecal again (the log says what is missing)"
+    return "none can import what it needs; install Glovecal again (the log says what is missing)"
 
 
 LOOP_IS_CLOSED = "IOLoop is closed"

@@ -9,13 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import typer.main
-
-from glovecal_service.cli.command import app
+from glovecal_service.cli.command import command
 
 ROOT = Path(__file__).resolve().parents[3]
 PRODUCT = ("client/glovecal_client", "models/glovecal_models", "models/glovecal", "service/glovecal_service")
-COMMAND: Any = typer.main.get_command(app)
+COMMAND: Any = command()
 TOLD = re.compile(r"(?<![\w./-])glovecal (?=[a-z])")
 END = re.compile(r"[\n`\";,()]| \| |   |\.(?= |$)|[.?]$|'s\b|: |:$")
 ADVICE = re.compile(r"(?:[:.] |: `|\n +)$")
