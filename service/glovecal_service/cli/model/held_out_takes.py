@@ -54,7 +54,8 @@ def warn_trained_on(model: str, trained_on: Sequence[str], takes: Sequence[dict[
     """Say which of ``takes`` the model has seen before."""
     names = [row["name"] for row in takes if row["id"] in trained_on]
     if names:
-        of = "all of them" if len(names) == len(takes) > 1 else f"take {', '.join(names)}"
+        several = f"all {len(names)} takes" if len(names) == len(takes) else f"takes {', '.join(names)}"
+        of = several if len(names) > 1 else f"take {names[0]}"
         err.print(
             f"Careful: model {model[:12]} was trained on {of}; this is not a held-out error.", style="yellow"
         )
