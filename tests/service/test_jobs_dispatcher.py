@@ -46,7 +46,7 @@ def test_one_command_runs_a_single_task_itself(sqlite_store, sqlite_settings, le
         assert facts["pid"] == os.getpid()
         assert facts["niceness"] == 10
         assert not dispatcher.workers.started
-        job = create(sqlite_store, ledger, [5], seconds=60)
+        job = create(sqlite_store, ledger, [5], seconds=600)
         wait_for(lambda: 5 in noted(ledger, "begin"))
         sqlite_store.jobs.request_cancel(job.id)
         assert wait_for_job(sqlite_store, job.id).state == "cancelled"
@@ -73,7 +73,7 @@ def test_what_was_computed_once_is_not_computed_again(dispatched, ledger):
 
 def test_cancelling_stops_the_fits_in_flight(dispatched, ledger):
     store, _ = dispatched
-    job = create(store, ledger, [1, 2, 3, 4, 5, 6], seconds=60)
+    job = create(store, ledger, [1, 2, 3, 4, 5, 6], seconds=600)
     wait_for(lambda: len(noted(ledger, "begin")) >= 2)
     store.jobs.request_cancel(job.id)
     job = wait_for_job(store, job.id)

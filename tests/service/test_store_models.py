@@ -1,8 +1,12 @@
 """Models: immutable, verified at each load, activated and rolled back in one step."""
 
+import itertools
 import threading
+from contextlib import suppress
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from sqlalchemy import text
 
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -15,9 +19,9 @@ def anna(store):
     return store
 
 
-def add(store, content: bytes, parent=None, subject="anna", layout="cyberglove18", **facts):
+def add(store, content: bytes, parent=None, subject="anna", layout="cyberglove18", hand=None, **facts):
     return store.models.add(
-        content, subject=subject, layout=layout, method="linear", parent=parent, facts=facts
+        content, subject=subject, layout=layout, method="linear", parent=parent, facts=facts, hand=hand
     )
 
 
@@ -161,3 +165,36 @@ def test_facts_that_are_not_json_are_refused(anna):
         with pytest.raises(BadInput):
             add(anna, b"model", wrong=fact)
     assert anna.models.list() == []
+
+
+HANDS = st.sampled_from(["left", "right", None])
+
+
+def test_a_hand_is_never_read_by_a_model_of_the_other(store):
+    """Whatever is activated and rolled back, in whatever order."""
+    persons = itertools.count()
+
+    @settings(max_examples=40)
+    @given(st.lists(st.tuples(HANDS, st.integers(0, 5), st.booleans()), min_size=1, max_size=12))
+    def holds(moves):
+        who = store.subjects.create(f"person-{next(persons)}").name
+        models = [
+            add(store, f"{who} {number}".encode(), subject=who, hand=hand)
+            for number, (hand, _, _) in enumerate(moves)
+        ]
+        for _, number, is_rollback in moves:
+            model = models[number % len(models)]
+            if not is_rollback:
+                store.models.activate(model.id)
+                assert store.models.is_active(model)
+                continue
+            with suppress(Conflict):
+                hand = store.models.rollback(who, "cyberglove18", model.hand).hand
+                assert model.hand is None or hand in (None, model.hand)
+        active = {hand: store.models.active(who, "cyberglove18", hand) for hand in ("left", "right", None)}
+        for hand, model in active.items():
+            assert model is None or hand is None or model.hand in (None, hand)
+        listed = {each.id for each in store.models.active_of_each_hand(who, "cyberglove18")}
+        assert {model.id for model in active.values() if model is not None} == listed
+
+    holds()

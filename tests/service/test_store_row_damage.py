@@ -225,6 +225,7 @@ def _as_before_hashes(store: Store) -> None:
         for name in ("takes", "model_takes", "recordings", "samplings", "jobs"):
             connection.execute(text(f"ALTER TABLE {name} DROP COLUMN row_sha256"))
         for name in ("models", "activations"):
+            connection.execute(text(f"ALTER TABLE {name} DROP COLUMN hand"))  # of 0007
             table = Table(name, MetaData(), autoload_with=connection)
             for row in connection.execute(select(table)).all():
                 values = {column: _plain(value) for column, value in row._mapping.items()}

@@ -12,7 +12,8 @@ from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
-from glovecal_models.hand.skeleton import Handedness, hand_skeleton
+from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.skeleton import hand_skeleton
 
 FORMAT = "glovecal hand shape 1"
 LARGEST_SHAPE_FILE = 100_000

@@ -25,10 +25,10 @@ from typing import Literal
 import numpy as np
 
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST
 from glovecal_models.hand.thumb_axes import ThumbAxes
 
-Handedness = Literal["right", "left"]
 Palm = Literal["rigid", "arching"]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -10,8 +10,8 @@ from typing import Any
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.hand.rotations import PALM
-from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.takes.common_event import common_events
 from glovecal_models.takes.hand_clocks import TakeClock, align
 from glovecal_models.takes.take import Take

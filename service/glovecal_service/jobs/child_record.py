@@ -13,7 +13,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_service.plain import plain
 from glovecal_service.store import Store
-from glovecal_service.store.records import ModelRecord, TakeRecord, incomplete_sentences
+from glovecal_service.store.records import ModelRecord, TakeRecord, hand_of, incomplete_sentences
 
 
 def artifact_array(model: CalibrationModel) -> np.ndarray:
@@ -40,6 +40,7 @@ def keep_child(
         layout=layout,
         method=model.method,
         parent=model.parent,
+        hand=hand_of(takes),
         facts=plain(
             {
                 "takes": [{"id": take.id, "name": take.name, "artifact": take.artifact} for take in takes],

@@ -126,17 +126,15 @@ def _model_that_fits(store: Store, own: ModelRecord, take: Take, most_deg: float
     ``most_deg``; None where there is none. Of many subjects those are asked whose models are newest."""
     best: tuple[float, str] | None = None
     newest = dict.fromkeys(item.subject for item in reversed(store.models.list(layout=own.layout)))
-    for subject in itertools.islice((one for one in newest if one != own.subject), MOST_ASKED):
-        active = store.models.active(subject, own.layout)
-        if active is None:
-            continue
+    asked = itertools.islice((one for one in newest if one != own.subject), MOST_ASKED)
+    for active in (each for one in asked for each in store.models.active_of_each_hand(one, own.layout)):
         try:
             found = residuals(load(store.models.load_bytes(active.id)), [take])
         except (BadInput, DamagedArtifact):  # it measures nothing of the take, or is told of elsewhere
             continue
         error = float(np.sqrt(np.nanmean(found.stacked("error") ** 2)))
         if error <= most_deg and (best is None or error < best[0]):
-            best = error, f"{subject}'s model {active.id[:12]} fits it: {error:.1f} degrees."
+            best = error, f"{active.subject}'s model {active.id[:12]} fits it: {error:.1f} degrees."
     return None if best is None else best[1]
 
 

@@ -19,13 +19,14 @@ from glovecal_models.calibration.training_plan import TrainingPlan, plan_trainin
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.comparison.odd_takes import odd_takes
 from glovecal_models.errors import BadInput, NotTrainable
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.progress import Report
 from glovecal_models.regression.kernel_scores import choice_of, kernel_sentences
 from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.training_takes import TrainingTakes
 from glovecal_service.store import Store
-from glovecal_service.store.records import JobRecord, TakeRecord
+from glovecal_service.store.records import JobRecord, TakeRecord, hand_of
 from glovecal_service.views.camera_range import camera_range_views
 
 _OWN_KEYS = {"subject", "layout", "takes", "activate", "parent", "prior"}
@@ -64,7 +65,9 @@ class TrainJob:
             said = [*taught.sentences, *_odd_sentences(taught, records), *order_sentences(order)]
             facts = _facts(model, plan, records, said) | {"settings": asdict(settings)}
             facts["confounded_order"] = _confounded(order)
-            return _keep(store, model, layout_name, facts, activate=bool(payload.get("activate", False)))
+            return _keep(
+                store, model, layout_name, facts, hand_of(records), bool(payload.get("activate", False))
+            )
 
         return JobPlan(
             tasks=[Task(task.key, _label(task), fit, task, _effort(task)) for task in plan.tasks],
@@ -209,7 +212,12 @@ def _weight_sentences(model: CalibrationModel) -> list[str]:
 
 
 def _keep(
-    store: Store, model: CalibrationModel, layout: str, facts: dict[str, Any], *, activate: bool
+    store: Store,
+    model: CalibrationModel,
+    layout: str,
+    facts: dict[str, Any],
+    hand: Handedness | None,
+    activate: bool,
 ) -> dict[str, Any]:
     record = store.models.add(
         dump(model),
@@ -218,6 +226,7 @@ def _keep(
         method=model.method,
         parent=model.parent,
         facts=facts,
+        hand=hand,
     )
     if activate:
         store.models.activate(record.id)

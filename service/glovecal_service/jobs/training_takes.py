@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import OF_SHAPES, TrainingSettings
 from glovecal_models.errors import NotTrainable
+from glovecal_models.hand.handedness import HANDS
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.guided_calibration import BASELINES, GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
@@ -16,7 +17,7 @@ from glovecal_models.sampling.template.template_samples import TemplateSamples, 
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_warnings import excluded_sentences
 from glovecal_service.store import Store
-from glovecal_service.store.records import SubjectRecord, TakeRecord, incomplete_sentences
+from glovecal_service.store.records import SubjectRecord, TakeRecord, hand_of, incomplete_sentences
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class TrainingTakes:
 
         A session with no reference system has an error estimate of its own.
         """
-        _require_one_hand(records)
+        require_one_hand(records)
         shapes = [record for record in records if record.hand_shape and settings.method in OF_SHAPES]
         sampled = [record for record in records if record.sampling and settings.method not in BASELINES]
         plain = tuple(
@@ -57,7 +58,7 @@ class TrainingTakes:
             for record in sampled
         ]
         taught += [shape_take(store.takes.load(record.id), record.hand_shape or "") for record in shapes]
-        measured = subject.skeleton() if subject.dimensions else None
+        measured = subject.skeleton(hand_of(records)) if subject.dimensions else None
         if settings.method == "two_shapes":
             return cls((*named_takes(taught, measured), *plain), layout, settings, tuple(incomplete))
         if settings.method == "template":
@@ -80,12 +81,12 @@ class TrainingTakes:
         return model if self._sampled is None else self._sampled.finished(model)
 
 
-def _require_one_hand(records: Sequence[TakeRecord]) -> None:
-    """A model is of one hand. Raises NotTrainable."""
-    of = {hand: next((row for row in records if row.known_hand == hand), None) for hand in ("left", "right")}
+def require_one_hand(records: Sequence[TakeRecord]) -> None:
+    """A model is of one hand. Raises NotTrainable where the takes are of both."""
+    of = {hand: next((row for row in records if row.known_hand == hand), None) for hand in HANDS}
     left, right = of["left"], of["right"]
     if left is not None and right is not None:
         raise NotTrainable(
-            f"take {left.name} is of a left glove and take {right.name} of a right one: no model reads both. "
-            "Leave the takes of one hand out, and give each hand a subject of its own"
+            f"take {left.name} is of a left glove and take {right.name} of a right one, and each hand has "
+            "models of its own: choose the hand (--hand left or --hand right), or takes of one hand"
         )

@@ -8,6 +8,7 @@ from typing import Any
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_models.hand.handedness import Handedness, is_of_hand, known_hand
 from glovecal_service.realtime.pose_meta import Serving
 from glovecal_service.realtime.served_model import ServedModel
 from glovecal_service.store.errors import DamagedRows, NotFound
@@ -17,7 +18,6 @@ from glovecal_service.store.store import Store
 
 Prepared = Mapping[tuple[str, tuple[str, ...]], ServedModel]
 """Models in use, by id and by the order in which their gloves send the sensors."""
-HANDS = ("left", "right")
 MOST_NAMED = 4
 
 
@@ -61,30 +61,49 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
         return replace(serving, sentence=sentence)
     sent = _sensors_sent(store, layout, meta)
     layouts = dict.fromkeys(model.layout for model in models)
-    active = [found for name in layouts if (found := _active(store, subject, name)) is not None]
+    hand = known_hand((meta or {}).get("hand"))
+    active = [found for name in layouts if (found := _active(store, subject, name, hand)) is not None]
     fitting = [item for item in active if _fits(item, layout, sent)]
     if not fitting:
-        return replace(serving, sentence=_why_none(store, serving, models, active, sent))
+        why = _other_hands_model(glove, subject, hand, models) or _why_none(
+            store, serving, [each for each in models if is_of_hand(each.hand, hand)], active, sent
+        )
+        return replace(serving, sentence=why)
     newest = max(fitting, key=lambda item: item.activation)
-    chain = _chain(store, newest.record)
+    chain = _chain(store, newest.record, [item.id for item in models if is_of_hand(item.hand, hand)])
     found = _first_that_loads(store, chain, newest.record.layout, serving, sent, prepared)
     return replace(
-        found, sentence="; ".join(filter(None, [_other_hand(store, subject, glove, meta), found.sentence]))
+        found,
+        sentence="; ".join(filter(None, [_other_hand(store, newest.record, glove, hand), found.sentence])),
     )
 
 
-def _other_hand(store: Store, subject: str, glove: str, meta: Mapping[str, Any] | None) -> str:
-    """That glove and wearer are said to be of different hands, a clause; "" where they are not."""
-    said = (meta or {}).get("hand")
+def _other_hand(store: Store, model: ModelRecord, glove: str, said: Handedness | None) -> str:
+    """That the glove is of another hand than the model's wearer, a clause; "" where it is not: a model whose
+    takes say their hand was chosen by it."""
     try:
-        hand = store.subjects.get(subject).known_hand
+        hand = store.subjects.get(model.subject).known_hand
     except NotFound:
         return ""
-    if said not in HANDS or hand in (None, said):
+    if model.hand is not None or said is None or hand in (None, said):
         return ""
     return (
-        f"wrong hand: {glove} is a {said} glove and {subject} a {hand} hand; exchange the gloves, or say who "
-        f"wears this one: glovecal glove wear {glove} SUBJECT"
+        f"wrong hand: {glove} is a {said} glove and {model.subject} a {hand} hand; exchange the gloves, or "
+        f"say who wears this one: glovecal glove wear {glove} SUBJECT"
+    )
+
+
+def _other_hands_model(
+    glove: str, subject: str, hand: Handedness | None, models: Sequence[ModelRecord]
+) -> str:
+    """That all models are of the other hand; "" where they are not."""
+    if hand is None or any(is_of_hand(model.hand, hand) for model in models):
+        return ""
+    other = models[-1].hand
+    return (
+        f"wrong hand: {glove} is a {hand} glove and every model of {subject} is of the {other} hand; "
+        f"exchange the gloves, or record and train this hand too: "
+        f"glovecal train --subject {subject} --hand {hand}"
     )
 
 
@@ -103,11 +122,11 @@ def _sensors_of(store: Store, layout: str) -> tuple[str, ...] | None:
         return None
 
 
-def _active(store: Store, subject: str, layout: str) -> ActiveModel | None:
-    record = store.models.active(subject, layout)
+def _active(store: Store, subject: str, layout: str, hand: Handedness | None) -> ActiveModel | None:
+    record = store.models.active(subject, layout, hand)
     if record is None:
         return None
-    newest = max(item.id for item in store.models.activations(subject, layout))
+    newest = max(item.id for item in store.models.activations(subject, layout) if item.model == record.id)
     return ActiveModel(record, newest, _sensors_of(store, layout))
 
 
@@ -118,13 +137,13 @@ def _fits(item: ActiveModel, layout: str, sent: tuple[str, ...] | None) -> bool:
     return not _why_not(item.record.id, item.sensors, sent)
 
 
-def _chain(store: Store, active: ModelRecord) -> list[str]:
-    """Model ids: the active one, then what rolling back would lead to."""
+def _chain(store: Store, active: ModelRecord, of_the_hand: Sequence[str]) -> list[str]:
+    """Model ids: the active one, then what rolling back would lead to, if it is ``of_the_hand``."""
     by_id = {item.id: item for item in store.models.activations(active.subject, active.layout)}
-    current, chain = by_id[max(by_id)], [active.id]
+    current, chain = by_id[max(id for id in by_id if by_id[id].model == active.id)], [active.id]
     while current.previous is not None and current.previous in by_id:
         current = by_id[current.previous]
-        if current.model not in chain:
+        if current.model not in chain and current.model in of_the_hand:
             chain.append(current.model)
     return chain
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, func, select
 
 from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_models.hand.handedness import Handedness, is_of_hand, known_hand
 from glovecal_models.names import check_identifier
 from glovecal_service.store import revision, tables
 from glovecal_service.store.artifacts import Artifacts
@@ -38,11 +40,13 @@ class Models:
         method: str,
         parent: str | None,
         facts: Mapping[str, Any],
+        hand: Handedness | None = None,
     ) -> ModelRecord:
         """Keep a model; its id is the sha256 of its artifact. The very same again gives the record there is.
 
         ``facts["takes"]`` lists the ids of the takes it was trained on (texts, or objects with ``id``);
-        ``facts["effects"]`` becomes the names of the artifact's effects, if it has any.
+        ``facts["effects"]`` becomes the names of the artifact's effects, if it has any. Without ``hand`` it
+        is of the parent's.
         Raises NotFound (subject or parent), Conflict (same bytes under another subject), StorageFull.
         """
         record = ModelRecord(
@@ -57,8 +61,8 @@ class Models:
         takes = _take_ids(facts.get("takes", ()))
         with self._database.write() as connection:
             require_subject(connection, subject)
-            if parent is not None:
-                _one(connection, parent)
+            before = None if parent is None else _one(connection, parent)
+            record = replace(record, hand=hand or (before and before.hand))
             if earlier := _find(connection, record.id):
                 if (earlier.subject, earlier.layout) != (subject, layout):
                     raise Conflict(
@@ -98,7 +102,7 @@ class Models:
         return self._artifacts.get(self.get(id).id)
 
     def activate(self, id: str) -> Activation:
-        """Let the model speak for its subject and layout from now on.
+        """Let the model speak for its subject, layout and hand from now on.
 
         The artifact is verified first; if that fails, whatever was active stays so. Raises NotFound,
         Conflict, DamagedArtifact.
@@ -107,7 +111,7 @@ class Models:
         self._artifacts.get(model.id)
         with self._database.write() as connection:
             revision.grow(connection)
-            earlier = _current(connection, model.subject, model.layout)
+            earlier = _current(connection, model.subject, model.layout, model.hand)
             if earlier is not None and earlier.model == model.id:
                 if earlier.id == _newest(connection, model.subject):
                     return earlier
@@ -115,34 +119,56 @@ class Models:
             previous = None if earlier is None else earlier.id
             return _append(connection, model, "activate", previous)
 
-    def rollback(self, subject: str, layout: str) -> Activation:
+    def rollback(self, subject: str, layout: str, hand: Handedness | None = None) -> Activation:
         """Return to the model that was active before; again, to the one before that.
 
-        Raises Conflict when nothing earlier was active, DamagedArtifact if the earlier one is damaged.
+        Raises Conflict when nothing earlier was active, and without ``hand`` where both hands have a model
+        of their own; DamagedArtifact if the earlier one is damaged.
         """
+        if hand is None and len(self.active_of_each_hand(subject, layout)) > 1:
+            raise Conflict(
+                f"subject {subject!r} has an active model of each hand with layout {layout!r}; say which hand"
+            )
         with self._database.write() as connection:
             revision.grow(connection)
-            current = _current(connection, subject, layout)
-            if current is None or current.previous is None:
+            current = _current(connection, subject, layout, hand)
+            target = None if current is None else _before(connection, current, hand)
+            if target is None:
                 raise Conflict(f"nothing earlier was active for subject {subject!r} with layout {layout!r}")
-            target = _activation(connection, current.previous)
             self._artifacts.get(target.model)
             return _append(connection, _one(connection, target.model), "rollback", target.previous)
 
-    def active(self, subject: str, layout: str) -> ModelRecord | None:
-        """The model that speaks for the subject with that layout, None if none does."""
+    def active(self, subject: str, layout: str, hand: Handedness | None = None) -> ModelRecord | None:
+        """The model that speaks for that hand of the subject with that layout, None if none does.
+
+        The newest of the hand's own and of those whose takes do not say; without ``hand`` the newest of all.
+        Where the hand has none of its own and the newest of all is of the other hand, none does.
+        """
         with self._database.read() as connection:
-            current = _current(connection, subject, layout)
-            return None if current is None else _one(connection, current.model)
+            hands = _hands(connection, subject, layout)
+            current = _current(connection, subject, layout, hand if hand in hands else None)
+            if current is None or not is_of_hand(current.hand, hand):
+                return None
+            return _one(connection, current.model)
+
+    def active_of_each_hand(self, subject: str, layout: str) -> list[ModelRecord]:
+        """One, or two where the hands have models of their own."""
+        with self._database.read() as connection:
+            hands = _hands(connection, subject, layout)
+        each = [self.active(subject, layout, hand) for hand in sorted(hands) or [None]]
+        return list({record.id: record for record in each if record is not None}.values())
+
+    def is_active(self, model: ModelRecord) -> bool:
+        """Whether it speaks for its subject with its layout, be it for one hand."""
+        return any(each.id == model.id for each in self.active_of_each_hand(model.subject, model.layout))
 
     def all_active(self) -> list[ModelRecord]:
-        """The active model of each subject and layout. Raises StoreDamaged."""
+        """The active models of each subject and layout. Raises StoreDamaged."""
         table = tables.activations
         statement = select(table.c.subject, table.c.layout).distinct()
         with self._database.read() as connection:
             pairs = connection.execute(statement.order_by(table.c.subject, table.c.layout)).all()
-            current = [_current(connection, subject, layout) for subject, layout in pairs]
-            return [_one(connection, item.model) for item in current if item is not None]
+        return [record for pair in pairs for record in self.active_of_each_hand(*pair)]
 
     def damage(self, model: ModelRecord) -> str:
         """Why the model's artifact cannot be loaded, and what to do; "" while it is what was stored."""
@@ -150,7 +176,7 @@ class Models:
             self._artifacts.get(model.id)
         except (DamagedArtifact, NotFound) as error:
             with self._database.read() as connection:
-                current = _current(connection, model.subject, model.layout)
+                current = _current(connection, model.subject, model.layout, model.hand)
             before = current is not None and current.model == model.id and current.previous is not None
             remedies = other_remedies(model.subject, model.layout, can_roll_back=before)
             return f"model {model.id[:12]} cannot be loaded: {error}{remedies}"
@@ -205,13 +231,30 @@ def _record(values: dict[str, Any]) -> ModelRecord:
     return ModelRecord(**values)
 
 
-def _current(connection: Connection, subject: str, layout: str) -> Activation | None:
+def _current(connection: Connection, subject: str, layout: str, hand: Handedness | None) -> Activation | None:
     table = tables.activations
     newest_first = select(table).where(_concerns(subject)).order_by(table.c.id.desc())
     for row in connection.execute(newest_first):
         found = _activation_record(sound_row(table, row))
-        if (found.subject, found.layout) == (subject, layout):
+        if (found.subject, found.layout) == (subject, layout) and is_of_hand(found.hand, hand):
             return found
+    return None
+
+
+def _hands(connection: Connection, subject: str, layout: str) -> set[Handedness]:
+    """Those that models of the subject with that layout are known to be of."""
+    table = tables.models
+    statement = select(table.c.hand).where(table.c.subject == subject, table.c.layout == layout)
+    hands = map(known_hand, connection.scalars(statement.distinct()))
+    return {hand for hand in hands if hand is not None}
+
+
+def _before(connection: Connection, current: Activation, hand: Handedness | None) -> Activation | None:
+    """What rolling back leads to."""
+    while current.previous is not None:
+        current = _activation(connection, current.previous)
+        if is_of_hand(current.hand, hand):
+            return current
     return None
 
 
@@ -241,6 +284,7 @@ def _append(connection: Connection, model: ModelRecord, kind: str, previous: int
         "model": model.id,
         "kind": kind,
         "previous": previous,
+        "hand": model.hand,
         "created_at": now(),
     }
     return Activation(id=add_row(connection, tables.activations, values), **values)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from glovecal_models.calibration.training_settings import OF_SHAPES
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Handedness, Palm, Skeleton, hand_skeleton
+from glovecal_models.hand.handedness import HANDS, Handedness, is_of_hand, known_hand
+from glovecal_models.hand.skeleton import Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
 from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.session_drift import shape_of
@@ -23,11 +24,6 @@ CLOCK_UNKNOWN = "clock_unknown"
 
 FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
 OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
-
-
-def known_hand(said: Any) -> Handedness | None:
-    """The hand that somebody named; None for anything else."""
-    return said if said in get_args(Handedness) else None
 
 
 @dataclass(frozen=True)
@@ -130,6 +126,10 @@ class TakeRecord:
         """Of the glove, as its capture said; None where it did not, and for imported files."""
         return known_hand((self.accounting or {}).get("hand"))
 
+    def is_of(self, hand: Handedness | None) -> bool:
+        """Whether it may be a take of that hand: where nobody said which hand it is of, of both."""
+        return is_of_hand(self.known_hand, hand)
+
     @property
     def state(self) -> Literal["complete", "repairing"]:
         """``repairing``: frames of its recording may still be fetched from the capture log."""
@@ -178,6 +178,13 @@ class TakeRecord:
         return self.teaches or (method in OF_SHAPES and self.hand_shape is not None)
 
 
+def hand_of(takes: Iterable[TakeRecord]) -> Handedness | None:
+    """The one hand that takes are known to be of; None where nobody said it, or where they are of both."""
+    known = {take.known_hand for take in takes}
+    hands: list[Handedness] = [hand for hand in HANDS if hand in known]
+    return hands[0] if len(hands) == 1 else None
+
+
 def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:
     """What is to be known of takes that are incomplete, or whose reference stayed unrepaired."""
     each = [sentence for take in takes for sentence in (take.incomplete_sentence, take.unaligned_sentence)]
@@ -196,6 +203,8 @@ class ModelRecord:
     facts: dict[str, Any]
     """``takes`` (ids), errors, seconds ...: whatever the trainer had to say."""
     created_at: datetime
+    hand: Handedness | None = None
+    """That of its takes; None where nobody said it, and it reads both hands' gloves."""
 
 
 @dataclass(frozen=True)
@@ -210,6 +219,8 @@ class Activation:
     previous: int | None
     """The activation that a rollback would return to, None if there is none."""
     created_at: datetime
+    hand: Handedness | None = None
+    """The model's."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import revision, tables
 from glovecal_service.store.clock import now

@@ -108,6 +108,7 @@ models = Table(
     Column("parent", SHA256),
     Column("facts", Json, nullable=False),
     Column("created_at", UtcTime, nullable=False),
+    Column("hand", String(8)),
     Column("row_sha256", SHA256, nullable=False),
     Index(None, "subject", "layout"),
 )
@@ -130,6 +131,7 @@ activations = Table(
     Column("kind", String(16), nullable=False),
     Column("previous", GROWING),
     Column("created_at", UtcTime, nullable=False),
+    Column("hand", String(8)),
     Column("row_sha256", SHA256, nullable=False),
     Index(None, "subject", "layout", "id"),
 )

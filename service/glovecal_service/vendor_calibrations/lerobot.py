@@ -14,8 +14,8 @@ from typing import Any
 
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.hand.rotations import FINGERS
-from glovecal_models.hand.skeleton import Handedness
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.names import did_you_mean
 from glovecal_service.vendor_calibrations.calibration_format import (

@@ -13,7 +13,7 @@ import numpy as np
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.training import uncertain_above
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.known_line import gains_of, line_of

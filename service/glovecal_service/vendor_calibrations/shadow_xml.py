@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from xml.etree import ElementTree
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.handedness import Handedness
 from glovecal_service.vendor_calibrations.calibration_format import (
     CalibrationFormat,
     Counts,

@@ -32,7 +32,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
         for seed, hand in enumerate(HANDS):
             options = ("--option", f"seed={seed}", "--option", f"hand={hand}", "--option", "rate_hz=60")
             capture = start(
-                reach, "capture", "--device", "simulated", "--glove", hand, "--subject", f"anna-{hand}",
+                reach, "capture", "--device", "simulated", "--glove", hand, "--subject", "anna",
                 "--wearing", "monday", *options,
             )  # fmt: skip
             running.callback(end, capture)
@@ -70,8 +70,9 @@ def test_both_hands_are_recorded_filmed_and_joined(
     markers = (tmp_path / "both.trc").read_text().splitlines()[3]
     assert "R_index" in markers
     assert "L_index" in markers
-    hands = {row["name"]: row["hand"] for row in run("subject", "list", "--json").json}
-    assert hands == {"anna-left": "left", "anna-right": "right"}, "as capture said: nobody added them"
+    assert [row["name"] for row in run("subject", "list", "--json").json] == ["anna"], "nobody added her"
+    hands = {row["id"]: row["known_hand"] for row in run("take", "list", "--json").json}
+    assert {id: hands[id] for id in (right, left)} == {right: "right", left: "left"}
 
 
 def test_hands_that_held_no_shape_are_told_no_drift(live: dict[str, str]) -> None:
@@ -80,7 +81,9 @@ def test_hands_that_held_no_shape_are_told_no_drift(live: dict[str, str]) -> Non
         done = run("shapes", *HANDS, "--at", place, "--seconds", 1.5, "--pause", 0)
         assert "10 takes of 5 shapes." in done.out, done.err
     for hand in HANDS:  # they moved freely all the time
-        assert f"anna-{hand}: no shape was held at both ends, so no drift is known (flat: the" in done.out
+        assert (
+            f"anna, {hand} hand: no shape was held at both ends, so no drift is known (flat: the" in done.out
+        )
 
 
 def test_a_glove_without_a_card_says_so(live: dict[str, str]) -> None:

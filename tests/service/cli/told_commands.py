@@ -25,9 +25,9 @@ SAMPLES = {
     "model": "0123456789ab", "short": "0123456789ab", "last": "0123456789ab", "newest": "0123456789ab",
     "parent": "0123456789ab", "id": "0123456789ab", "12": "0123456789ab", "SHORT": "0123456789ab",
     "subject": "anna", "SUBJECT": "anna", "NAME": "anna", "name": "anna", "SOURCE": "camera:0",
-    "glove": "right", "GLOVE": "right", "LENGTH": "190", "seed": "1", "FILE": __file__, "file": __file__,
+    "glove": "right", "hand": "left", "GLOVE": "right", "LENGTH": "190", "seed": "1", "file": "FILE",
     "named": "--take 0123456789ab", "field": "0123456789ab", "effect": "hysteresis",
-    "table": __file__, "layout": "cyberglove18", "TAKE": "0123456789ab", "DEVICE": "simulated",
+    "table": "FILE", "layout": "cyberglove18", "TAKE": "0123456789ab", "DEVICE": "simulated",
     "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "device": "lucidglove:/dev/ttyUSB0",
 }  # fmt: skip
 
@@ -97,7 +97,9 @@ def _sample(expression: str) -> str:
 
 
 def with_samples(line: str) -> str:
-    """With a value in the place of each NAME in capitals."""
+    """With a value in the place of each NAME in capitals; a file is there only now: its path may hold what
+    ends a command in a sentence."""
+    values = SAMPLES | {"FILE": __file__}
     return " ".join(
-        shlex.quote(SAMPLES.get(word, word) if word.isupper() else word) for word in shlex.split(line)
+        shlex.quote(values.get(word, word) if word.isupper() else word) for word in shlex.split(line)
     )

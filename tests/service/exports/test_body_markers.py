@@ -9,8 +9,9 @@ import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.hand.rotations import HAND_ROTATIONS
-from glovecal_models.hand.skeleton import Handedness, hand_skeleton
+from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.body_markers import BodyMarkers, hand_frame, read_trc
 from glovecal_service.exports.hand_motion import HandMotion
 from glovecal_service.exports.markers import markers

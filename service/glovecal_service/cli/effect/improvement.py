@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
+from glovecal_models.hand.handedness import Handedness
 from glovecal_service.cli.glove.layouts import layout_named
 from glovecal_service.cli.take.files import FileSubject
-from glovecal_service.cli.take.rows import find_takes
+from glovecal_service.cli.take.rows import find_takes, takes_of
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
-from glovecal_service.cli.terminal.options import AsJson, subject_named
+from glovecal_service.cli.terminal.options import AsJson, OnlyHand, subject_named
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import wait_for_job
@@ -86,6 +87,7 @@ def improve(
         str | None,
         typer.Option("--layout", "-l", help="Layout name or layout file. Default: made of the columns."),
     ] = None,
+    hand: OnlyHand = None,
     method: Annotated[Method, typer.Option(help="The base that effects are added to.")] = "lmc_gpr",
     samples: Annotated[int, typer.Option(min=10, max=5000, help="Most samples for one rotation.")] = 2000,
     max_steps: Annotated[int, typer.Option(min=0, max=20, help="Effects to add at most.")] = 6,
@@ -112,7 +114,7 @@ def improve(
         require_place(report, overwrite=overwrite)
     with connect() as service:
         chosen = _chosen(
-            service, takes or [], holdout or [], take or [], subject, layout, spread=spread_equal_times
+            service, takes or [], holdout or [], take or [], subject, layout, hand, spread=spread_equal_times
         )
         options = {"method": method, "samples": samples, "max_steps": max_steps, "seed": seed}
         options["ceiling"] = ceiling
@@ -134,6 +136,7 @@ def _chosen(
     take: Sequence[str],
     subject: str | None,
     layout: str | None,
+    hand: Handedness | None,
     *,
     spread: bool,
 ) -> dict[str, Any]:
@@ -158,7 +161,7 @@ def _chosen(
     if not learned:
         learned = [
             row["id"]
-            for row in rows
+            for row in takes_of(rows, hand)
             if row["rotations"] and row["id"] not in held and layout in (None, row["layout"])
         ]
     layouts = sorted({row["layout"] for row in rows if row["id"] in {*learned, *held}})

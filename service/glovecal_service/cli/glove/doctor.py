@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_client.errors import ClientError, NoAnswer
+from glovecal_models.hand.handedness import HANDS, is_of_hand, known_hand
 from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
@@ -26,7 +27,6 @@ FOUND = 4
 """Exit code when something is wrong: 1 to 3 mean that nothing could be said."""
 WAIT_S = 5.0
 FEWEST_FRAMES = 20
-HANDS = ("left", "right")
 
 
 def doctor(
@@ -130,12 +130,13 @@ def _model(glove: str, meta: Mapping[str, Any]) -> tuple[CalibrationModel | None
             if subject not in known:
                 add = f"Add the subject, then sample or train: glovecal subject add {subject}."
                 return None, [GloveFinding("model", f"{subject}, who wears {glove}, is no subject yet.", add)]
-            hand, found = known[subject], []
-            if meta.get("hand") in HANDS and hand in HANDS and meta["hand"] != hand:
-                wrong = f"{glove} is a {meta['hand']} glove, {subject} is a {hand} hand."
-                found.append(GloveFinding("model", wrong, "Exchange the gloves, or say who wears this one."))
+            hand, worn, found = known[subject], known_hand(meta.get("hand")), []
             query = {"subject": subject, "layout": str(meta.get("layout"))}
-            active = [row for row in service.get("/models", query) if row["active"]]
+            models = service.get("/models", query)
+            if worn and hand in HANDS and worn not in (hand, *(row["hand"] for row in models)):
+                wrong = f"{glove} is a {worn} glove, {subject} is a {hand} hand."
+                found.append(GloveFinding("model", wrong, "Exchange the gloves, or say who wears this one."))
+            active = [row for row in models if row["active"] and is_of_hand(row["hand"], worn)]
             if not active:
                 none = f"No model of {subject} with layout {meta.get('layout')} is active."
                 train = f"Train one, or choose one: glovecal train --subject {subject}."

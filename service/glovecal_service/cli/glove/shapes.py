@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
+from glovecal_models.hand.handedness import known_hand
 from glovecal_models.takes.session_drift import SHAPES
 from glovecal_service.cli.glove.beside import finish_video, video_beside, warn_of_cold_gloves
 from glovecal_service.cli.glove.recordings import finish_takes, start_takes
@@ -41,8 +42,9 @@ def shapes(
             started = start_takes(service, gloves, {"name": f"{at}-{shape}", "lead_s": 0})
             wait_seconds(seconds, f"hold {shape}", quiet=as_json)
             takes += finish_takes(service, started)
-        subjects = list(dict.fromkeys(one["subject"] for one in takes if one["subject"]))
-        drifts = [_drift(service, subject) for subject in subjects] if at == "end" else []
+        seen = {glove["name"]: known_hand(glove["hand"]) for glove in service.get("/gloves")["seen"]}
+        worn = dict.fromkeys((one["subject"], seen[one["glove"]]) for one in takes if one["subject"])
+        drifts = [_drift(service, *each) for each in worn] if at == "end" else []
         if film is not None:
             finish_video(service, film, takes)
     if as_json:
@@ -50,11 +52,13 @@ def shapes(
         return
     out.print(f"{len(takes)} takes of {len(SHAPES)} shapes.")
     for drift in drifts:
-        out.print(f"{drift['subject']}: {drift['sentence']}")
+        of = f"{drift['subject']}, {drift['hand']} hand" if drift["hand"] else drift["subject"]
+        out.print(f"{of}: {drift['sentence']}")
 
 
-def _drift(service: Any, subject: str) -> dict[str, Any]:
+def _drift(service: Any, subject: str, hand: str | None) -> dict[str, Any]:
+    worn = {"subject": subject, "hand": hand}
     try:
-        return service.post("/takes/session-drift", {"subject": subject}) | {"subject": subject}
+        return service.post("/takes/session-drift", worn) | worn
     except ServiceError as error:
-        return {"subject": subject, "sentence": error.detail or str(error)}
+        return worn | {"sentence": error.detail or str(error)}

@@ -36,7 +36,8 @@ def held_out_takes(
     if wanted:
         return find_takes(service.get("/takes"), wanted)
     subject, layout = models[0]["subject"], models[0]["layout"]
-    rows = service.get("/takes", {"subject": subject, "layout": layout})
+    wanted_rows = {"subject": subject, "layout": layout, "hand": models[0]["hand"]}
+    rows = service.get("/takes", {name: value for name, value in wanted_rows.items() if value})
     trained = {take["id"] for document in models for take in document["facts"].get("takes", [])}
     measured = [row for row in rows if row["rotations"]]
     rows = [row for row in measured if row["id"] not in trained]

@@ -25,6 +25,7 @@ from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import (
     AsJson,
     Model,
+    OnlyHand,
     OnlyLayout,
     OnlySubject,
     Subject,
@@ -54,7 +55,7 @@ app = typer.Typer(help="Calibration models: versions, activation, export, import
 
 @app.command("list")
 def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
-    """List models, oldest first; the active one of each subject and layout is marked."""
+    """List models, oldest first; the active one of each subject, layout and hand is marked."""
     wanted = {"subject": subject, "layout": layout}
     with connect() as service:
         rows = service.get("/models", {key: value for key, value in wanted.items() if value})
@@ -75,6 +76,7 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         "short": "model",
         "subject": "subject",
         "layout": "layout",
+        **({"hand": "hand"} if any(row["hand"] for row in rows) else {}),
         "method": "method",
         "errors": "error (°)",
         "active": "active",
@@ -145,6 +147,7 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
         "model": document["id"],
         "subject": document["subject"],
         "layout": document["layout"],
+        "hand": document["hand"],
         "method": document["method"],
         "active": document["active"],
         "error (°)": document["held_out_rmse_deg"],
@@ -185,10 +188,10 @@ def refine(
 
 
 @app.command("rollback")
-def rollback(subject: Subject, layout: OnlyLayout = None) -> None:
-    """Return to the model that was active before. The layout is needed only if there are several."""
+def rollback(subject: Subject, layout: OnlyLayout = None, hand: OnlyHand = None) -> None:
+    """Return to the model that was active before. Layout and hand are needed only if there are several."""
     with connect() as service:
-        wanted = {"subject": subject, "layout": layout or _only_layout(service, subject)}
+        wanted = {"subject": subject, "layout": layout or _only_layout(service, subject), "hand": hand}
         document = service.post("/models/rollback", wanted)
     out.print(f"Model {document['model'][:12]} is active again for {subject}, {wanted['layout']}.")
 
@@ -283,14 +286,22 @@ def import_model(
 
 
 def active_model(service: RestClient, subject: str | None, layout: str | None) -> str:
-    """Its id. Raises BadParameter without a subject, Refusal when there is none or one of each layout."""
+    """Its id. Raises BadParameter without a subject, Refusal when there is none, or one of each layout or
+    hand."""
     if subject is None:
         raise typer.BadParameter("name a model, or a subject with --subject")
     query = {"subject": subject} | ({"layout": layout} if layout else {})
     active = [row for row in service.get("/models", query) if row["active"]]
+    layouts = sorted({row["layout"] for row in active})
+    if len(layouts) > 1:
+        raise Refusal(
+            f"subject {subject} has active models of {', '.join(layouts)}; choose one with --layout"
+        )
     if len(active) > 1:
-        layouts = ", ".join(row["layout"] for row in active)
-        raise Refusal(f"subject {subject} has active models of {layouts}; choose one with --layout")
+        each = " and ".join(f"{row['id'][:12]} of the {row['hand']} hand" for row in active)
+        raise Refusal(
+            f"subject {subject} has two gloves and two active models: {each}; name the one you mean"
+        )
     if not active:
         raise Refusal(f"subject {subject} has no active model; train one: glovecal train --subject {subject}")
     return active[0]["id"]

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from glovecal_service.cli.take.rows import find_takes
+from glovecal_models.hand.handedness import Handedness
+from glovecal_service.cli.take.rows import find_takes, takes_of
 from glovecal_service.cli.terminal.connection import connect, is_remote
-from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, Subject
+from glovecal_service.cli.terminal.options import AsJson, OnlyHand, OnlyLayout, Subject
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_sentences
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import wait_for_job
@@ -40,6 +41,7 @@ def train(
         ),
     ] = None,
     leave_out: Annotated[list[str] | None, typer.Option(help="Take to keep for testing; repeat.")] = None,
+    hand: OnlyHand = None,
     pseudo_inputs: Annotated[
         int, typer.Option(min=2, max=1000, help="SPGP's number of pseudo-inputs.")
     ] = 100,
@@ -73,7 +75,7 @@ def train(
             "--no-wait needs a service that goes on after this command: set GLOVECAL_URL"
         )
     with connect() as service:
-        chosen, layout = _choose(service, subject, layout, take or [], leave_out or [], method)
+        chosen, layout = _choose(service, subject, layout, hand, take or [], leave_out or [], method)
         body: dict[str, Any] = {"subject": subject, "layout": layout, "method": method, "takes": chosen}
         body |= {"activate": activate, "pseudo_inputs": pseudo_inputs, "samples": samples}
         body |= {"folds": folds, "seed": seed, "keep_dead": keep_dead}
@@ -122,6 +124,7 @@ def _choose(
     service: RestClient,
     subject: str,
     layout: str | None,
+    hand: Handedness | None,
     wanted: list[str],
     left_out: list[str],
     method: str,
@@ -133,7 +136,7 @@ def _choose(
     rows = service.get("/takes", {"subject": subject})
     without = {row["id"] for row in find_takes(rows, left_out)}
     teaching = [row for row in rows if row["teaches"] or (row["hand_shape"] and method in OF_SHAPES)]
-    chosen = find_takes(rows, wanted) or teaching
+    chosen = find_takes(rows, wanted) or takes_of(teaching, hand)
     for row in chosen:
         if row not in teaching:
             raise Refusal(

@@ -10,7 +10,8 @@ import typer
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import Handedness, Palm
+from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.skeleton import Palm
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
 from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import typer
 
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.handedness import Handedness
 from glovecal_service.cli.take.rows import find_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from glovecal_models.hand.handedness import Handedness, is_of_hand
 from glovecal_models.names import did_you_mean
 from glovecal_service.cli.terminal.printing import print_table
 from glovecal_service.cli.terminal.refusal import Refusal
@@ -50,6 +51,11 @@ def find_takes(rows: Sequence[dict[str, Any]], wanted: Iterable[str]) -> list[di
     """Each take that is meant, once."""
     found = [find_take(rows, name) for name in wanted]
     return list({row["id"]: row for row in found}.values())
+
+
+def takes_of(rows: Iterable[dict[str, Any]], hand: Handedness | None) -> list[dict[str, Any]]:
+    """Takes of that hand, and those of which nobody said it; all without ``hand``."""
+    return [row for row in rows if is_of_hand(row["known_hand"], hand)]
 
 
 def _listed(rows: Sequence[dict[str, Any]]) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.names import check_identifier, subject_name
 from glovecal_service.cli.terminal.printing import err
 
@@ -72,6 +73,9 @@ def _job_id(value: str) -> str:
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 Subject = Annotated[
     str, typer.Option("--subject", "-s", help="The subject's short name.", callback=subject_named)
+]
+OnlyHand = Annotated[
+    Handedness | None, typer.Option("--hand", help="Of a subject with two gloves, which: left or right.")
 ]
 OnlySubject = Annotated[
     str | None, typer.Option("--subject", "-s", help="Only of this subject.", callback=subject_named)

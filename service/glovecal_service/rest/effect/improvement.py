@@ -8,6 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from glovecal_models.errors import BadInput
+from glovecal_service.jobs.training_takes import require_one_hand
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Identifier, StrictBody, SubjectName
@@ -55,6 +56,7 @@ def improve(body: ImprovementRequest, store: StoreNeeded, response: Response) ->
     store.layouts.get(body.layout)
     takes = takes_named(store, body.takes, body.subject, body.layout)
     holdout = takes_named(store, body.holdout or (), body.subject, body.layout)
+    require_one_hand([*takes, *holdout])
     both = {take.id for take in takes} & {take.id for take in holdout}
     if both:
         name = next(take.name for take in takes if take.id in both)

@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.names import did_you_mean
 
 ID = r"^[0-9a-f]{12}$"
@@ -65,6 +66,9 @@ SubjectInPath = Annotated[
     AfterValidator(str.lower),
 ]
 SubjectFilter = Annotated[SubjectName | None, Query(description="Only this subject's.")]
+HandFilter = Annotated[
+    Handedness | None, Query(description="Only this hand's, and those of which nobody said whose they are.")
+]
 LayoutFilter = Annotated[str | None, Query(pattern=IDENTIFIER, description="Only of this layout.")]
 Id = Annotated[str, StringConstraints(pattern=ID)]
 """Of takes, recordings and jobs."""

@@ -9,7 +9,7 @@ from glovecal_models.calibration.explanation import chosen_rotations
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_service.rest.http.dependencies import Parts
 from glovecal_service.rest.model.comparison import Against, chosen
-from glovecal_service.rest.model.model_takes import takes_named
+from glovecal_service.rest.model.model_takes import takes_for
 from glovecal_service.store.records import ModelRecord, TakeRecord
 
 
@@ -27,7 +27,7 @@ def compared_takes(id: str, takes: Sequence[str], rotation: str | None, parts: P
     """Takes by id or name. Raises NotFound, Conflict, LayoutMismatch, NotTrainable (no reference angles),
     and BadInput for a ``rotation`` that the model does not have."""
     record = parts.store.models.get(id)
-    rows = takes_named(parts.store, takes, record.subject, record.layout)
+    rows = takes_for(parts.store, record, takes)
     _, model, _, seen = chosen(record.id, Against(takes=[row.id for row in rows]), parts)
     if rotation is not None:
         chosen_rotations(model, [rotation])

@@ -11,7 +11,7 @@ from glovecal_models.calibration.explanation import chosen_rotations, explain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody, TakeReference
-from glovecal_service.rest.model.model_takes import takes_named
+from glovecal_service.rest.model.model_takes import takes_for
 from glovecal_service.views.explanation import ExplanationView, explanation_view
 
 router = APIRouter(prefix="/models", tags=["models"])
@@ -41,7 +41,7 @@ def explain_angles(id: ModelInPath, body: OneFrame, parts: PartsNeeded) -> Expla
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
     rotations = chosen_rotations(model, body.rotations)
-    (take,) = takes_named(parts.store, [body.take], record.subject, record.layout, measured=False)
+    (take,) = takes_for(parts.store, record, [body.take], measured=False)
     loaded = parts.store.takes.load(take.id)
     with parts.predictors.one_at_a_time:
         found = explain(model, loaded, body.at_s)

@@ -23,7 +23,7 @@ from glovecal_service.rest.http.request_types import SHA256_PREFIX, SubjectName
 from glovecal_service.rest.model.models import Model, ModelInFull, model_details, model_row
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import Conflict, NotFound
-from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.store.records import ModelRecord, TakeRecord, hand_of
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -110,16 +110,18 @@ def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> dict
     if layout_is_new:
         parts.store.layouts.put(model.layout)
     known = {record.id for record in parts.store.models.list()}
+    takes = parts.store.takes.list(subject)
     record = parts.store.models.add(
         artifact,
         subject=subject,
         layout=model.layout.name,
         method=model.method,
         parent=model.parent if model.parent in known else None,
-        facts=_facts(model, parts.store.takes.list(subject)),
+        facts=_facts(model, takes),
+        hand=hand_of(take for take in takes if take.artifact in model.takes),
     )
     return {
-        "model": model_row(record, _is_active(parts, record)),
+        "model": model_row(record, parts.store.models.is_active(record)),
         "is_new": record.id not in known,
         "layout_is_new": layout_is_new,
         "subject_created": subject_created,
@@ -180,8 +182,3 @@ def _facts(model: CalibrationModel, takes: Sequence[TakeRecord]) -> dict[str, An
         "sentences": [f"Imported. It was trained on {len(model.takes)} takes; {here}."],
         "simulated": model.simulated,
     }
-
-
-def _is_active(parts: Parts, record: ModelRecord) -> bool:
-    active = parts.store.models.active(record.subject, record.layout)
-    return active is not None and active.id == record.id

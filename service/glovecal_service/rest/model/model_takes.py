@@ -10,6 +10,7 @@ from pydantic import Field
 from glovecal_models.errors import LayoutMismatch, NotTrainable
 from glovecal_models.names import did_you_mean
 from glovecal_service.jobs.model_work import trained_ids
+from glovecal_service.jobs.training_takes import require_one_hand
 from glovecal_service.rest.http.request_types import TakeReference
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
@@ -24,8 +25,8 @@ TakesNamed = Annotated[list[TakeReference], Field(min_length=1, max_length=MOST_
 def model_takes(store: Store, model: ModelRecord, wanted: Sequence[str] | None) -> list[TakeRecord]:
     """``wanted`` are ids or names, None: the training takes that have a reference.
 
-    Raises NotFound, Conflict (another subject's take, or a name that several have), LayoutMismatch,
-    NotTrainable (no reference angles).
+    Raises NotFound, Conflict (another subject's take, the other hand's, or a name that several have),
+    LayoutMismatch, NotTrainable (no reference angles).
     """
     if wanted is None:
         found = [store.takes.get(id) for id in trained_ids(store, model)]
@@ -35,14 +36,28 @@ def model_takes(store: Store, model: ModelRecord, wanted: Sequence[str] | None) 
                 f"no take that model {model.id[:12]} was trained on has reference angles any more; name some"
             )
         return found
-    return takes_named(store, wanted, model.subject, model.layout)
+    return takes_for(store, model, wanted)
+
+
+def takes_for(
+    store: Store, model: ModelRecord, wanted: Sequence[str], *, measured: bool = True
+) -> list[TakeRecord]:
+    """Takes named for work on a model. Raises as ``model_takes``."""
+    found = takes_named(store, wanted, model.subject, model.layout, measured=measured)
+    for take in found:
+        if not take.is_of(model.hand):
+            raise Conflict(
+                f"take {take.id} ({take.name!r}) is of the {take.known_hand} hand, model {model.id[:12]} of "
+                f"the {model.hand} one"
+            )
+    return found
 
 
 def takes_named(
     store: Store, wanted: Sequence[str], subject: str, layout: str, *, measured: bool = True
 ) -> list[TakeRecord]:
-    """Takes of one subject and layout, each once, by id or name; without ``measured`` also those that have
-    no reference. Raises as ``model_takes``."""
+    """Takes of one subject, layout and hand, each once, by id or name; without ``measured`` also those that
+    have no reference. Raises as ``model_takes``."""
     every = store.takes.list()
     found = [_one(every, name, subject) for name in wanted]
     for take in found:
@@ -55,6 +70,7 @@ def takes_named(
                 f"take {take.id} ({take.name!r}) has no reference angles; attach some with "
                 f"PUT /v1/takes/{take.id}/reference"
             )
+    require_one_hand(found)
     return list({take.id: take for take in found}.values())
 
 

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import DamagedArtifact
+from glovecal_models.hand.handedness import Handedness, is_of_hand
 from glovecal_models.regression.known_line import gains_of
 from glovecal_models.regression.linear_regressor import LinearRegressor
 from glovecal_service.plain import plain
@@ -18,6 +19,7 @@ from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.damaged_rows import warn, without_damaged
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.http.request_types import (
+    HandFilter,
     Identifier,
     LayoutFilter,
     ModelInPath,
@@ -39,6 +41,10 @@ class Model(BaseModel):
     layout: str
     method: str
     parent: str | None
+    hand: Handedness | None = Field(
+        description="That of the takes it was trained on: a subject's gloves have models of their own. Null: "
+        "nobody said it, and it reads both."
+    )
     active: bool = Field(
         description="Whether live frames of the subject with the layout are predicted by it."
     )
@@ -95,23 +101,26 @@ class ActivationView(BaseModel):
 class Which(StrictBody):
     subject: SubjectName
     layout: Identifier
+    hand: Handedness | None = Field(None, description="Needed where both hands have a model of their own.")
 
 
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
 def list_models(
-    store: StoreNeeded, response: Response, subject: SubjectFilter = None, layout: LayoutFilter = None
+    store: StoreNeeded,
+    response: Response,
+    subject: SubjectFilter = None,
+    layout: LayoutFilter = None,
+    hand: HandFilter = None,
 ) -> list[dict[str, Any]]:
     """Damaged rows are left out and named in `Warning` headers."""
-    records = without_damaged(response, lambda: store.models.list(subject=subject, layout=layout))
+    every = without_damaged(response, lambda: store.models.list(subject=subject, layout=layout))
+    records = [record for record in every if is_of_hand(record.hand, hand)]
     active = set()
     for pair in sorted({(record.subject, record.layout) for record in records}):
         try:
-            found = store.models.active(*pair)
+            active |= {found.id for found in store.models.active_of_each_hand(*pair)}
         except StoreDamaged as error:
             warn(response, str(error))
-            continue
-        if found is not None:
-            active.add(found.id)
     return [
         model_row(record, record.id in active, store.models.damage(record) if record.id in active else "")
         for record in records
@@ -127,17 +136,16 @@ def list_models(
 def roll_back(body: Which, store: StoreNeeded) -> Activation:
     """Again: to the one before that. 409 when nothing earlier was active."""
     store.subjects.get(body.subject)
-    return store.models.rollback(body.subject, body.layout)
+    return store.models.rollback(body.subject, body.layout, body.hand)
 
 
 @router.get("/{id}", response_model=ModelInFull, summary="One model", responses=problems(409))
 def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     record = parts.store.models.get(id)
-    active = parts.store.models.active(record.subject, record.layout)
     if damage := parts.store.models.damage(record):
         raise DamagedArtifact(damage)
     model, _ = parts.predictors.get(record.id)
-    return model_row(record, active is not None and active.id == record.id) | model_details(model)
+    return model_row(record, parts.store.models.is_active(record)) | model_details(model)
 
 
 @router.get(
@@ -148,8 +156,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
 )
 def get_lineage(id: ModelInPath, store: StoreNeeded) -> list[dict[str, Any]]:
     line = store.models.lineage(id)
-    active = store.models.active(line[0].subject, line[0].layout)
-    return [model_row(record, active is not None and active.id == record.id) for record in line]
+    return [model_row(record, store.models.is_active(record)) for record in line]
 
 
 @router.post(
@@ -188,7 +195,12 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
 def model_row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
     """As ``Model`` shows it."""
     effects = list(record.facts.get("effects", ()))
-    row = {**record.__dict__, "active": active, "effects": effects, "facts": plain(record.facts)}
+    row = {
+        **record.__dict__,
+        "active": active,
+        "effects": effects,
+        "facts": plain(record.facts),
+    }
     row["damage"] = damage or None
     return row | {
         name: plain(record.facts.get(name)) for name in ("held_out_rmse_deg", "rmse_unseen_wearing_deg")

@@ -16,7 +16,7 @@ from glovecal_service.plain import plain
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
-from glovecal_service.rest.model.model_takes import TakesNamed, takes_named
+from glovecal_service.rest.model.model_takes import TakesNamed, takes_for
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord
 from glovecal_service.views.quick_check import QuickCheckView, found_and_left, quick_check_view
@@ -45,7 +45,7 @@ def check_wearing(id: ModelInPath, body: Check, parts: PartsNeeded) -> QuickChec
     """
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
-    rows = takes_named(parts.store, body.takes, record.subject, record.layout, measured=False)
+    rows = takes_for(parts.store, record, body.takes, measured=False)
     takes = [parts.store.takes.load(row.id) for row in rows]
     trained = _training_takes(parts, record)
     sensitivity = sensor_sensitivity(model)

@@ -9,6 +9,8 @@ from pydantic import Field, field_validator
 
 from glovecal_models.calibration.training_settings import Method
 from glovecal_models.errors import BadInput, LayoutMismatch, NotTrainable
+from glovecal_models.hand.handedness import Handedness
+from glovecal_service.jobs.training_takes import require_one_hand
 from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.request_types import Id, Identifier, ModelReference, StrictBody, SubjectName
@@ -25,6 +27,10 @@ MOST_TAKES = 1000
 class Training(StrictBody):
     subject: SubjectName
     layout: Identifier | None = Field(None, description="None: that of the takes, if it is one.")
+    hand: Handedness | None = Field(
+        None,
+        description="Only its takes, and those of which nobody said it; needed where there are both hands'.",
+    )
     method: Method = Field("lmc_gpr", description="`auto` chooses a kernel for each rotation.")
     takes: Annotated[list[Id], Field(min_length=1, max_length=MOST_TAKES)] | None = Field(
         None,
@@ -67,7 +73,7 @@ def train(body: Training, store: StoreNeeded, response: Response) -> JobRecord:
         store.layouts.get(body.layout)
     takes = _chosen_takes(store, body)
     chosen = {"layout": takes[0].layout, "takes": [take.id for take in takes]}
-    payload: dict[str, Any] = body.model_dump() | chosen
+    payload: dict[str, Any] = body.model_dump(exclude={"hand"}) | chosen
     if body.parent is not None:
         payload["parent"] = store.models.get(body.parent).id
     if body.prior is not None:
@@ -87,7 +93,7 @@ def _prior(store: Store, body: Training) -> ModelRecord:
 def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
     if body.takes is None:
         every = store.takes.list(subject=body.subject, layout=body.layout)
-        takes = [take for take in every if take.teaches_by(body.method)]
+        takes = [take for take in every if take.teaches_by(body.method) and take.is_of(body.hand)]
     else:
         takes = [store.takes.get(id) for id in dict.fromkeys(body.takes)]
     for take in takes:
@@ -105,6 +111,7 @@ def _chosen_takes(store: Store, body: Training) -> list[TakeRecord]:
             f"no take of subject {body.subject!r}{of_layout} has reference angles; "
             "import some with r.ROTATION columns, or attach a reference to a recording"
         )
+    require_one_hand(takes)
     layouts = sorted({take.layout for take in takes})
     if len(layouts) > 1:
         raise LayoutMismatch(f"the takes have layouts {', '.join(layouts)}; choose one of them as layout")

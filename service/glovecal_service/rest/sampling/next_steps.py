@@ -84,7 +84,9 @@ def _others(store: Store, record: ModelRecord, trained: list[TakeRecord]) -> lis
     """The subject's other takes of the same wearings, the newest first."""
     ids, wearings = {row.id for row in trained}, {row.wearing for row in trained}
     every = store.takes.list(subject=record.subject, layout=record.layout)
-    others = [row for row in every if row.id not in ids and row.wearing in wearings]
+    others = [
+        row for row in every if row.id not in ids and row.wearing in wearings and row.is_of(record.hand)
+    ]
     return [row for row in others if row.duration_s <= LONGEST_OTHER_S][::-1][:MOST_OTHER_TAKES]
 
 

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field, FiniteFloat
 
+from glovecal_models.hand.handedness import known_hand
 from glovecal_models.sampling.catalogue import ROD_MM, Equipment, ProtocolName, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.guided.touch_watch import require_possible_touches
@@ -31,9 +32,8 @@ from glovecal_service.rest.http.request_types import (
     WearingName,
 )
 from glovecal_service.store.errors import Conflict
-from glovecal_service.store.records import GloveRecord, SamplingRecord
+from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.sampling_reuse import reuse_takes
-from glovecal_service.store.store import Store
 from glovecal_service.views.sampling import SamplingView, TargetView, sampling_view, target_view
 
 router = APIRouter(prefix="/sampling", tags=["sampling"])
@@ -99,10 +99,9 @@ class Reused(BaseModel):
     responses=change_problems(409),
 )
 def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) -> SamplingView:
-    """404 when the glove was never seen, 409 while it is in another sampling or of the other hand, 422 for a
-    touch that the subject's hand cannot do."""
+    """404 when the glove was never seen, 409 while it is in another sampling, 422 for a touch that the
+    subject's hand cannot do."""
     glove = store.gloves.get(body.glove)
-    _require_same_hand(store, glove, body.subject)
     if glove.layout is None:
         raise Conflict(f"glove {glove.name!r} has not said which layout it has; is its capture running?")
     layout = store.layouts.get(glove.layout)
@@ -111,7 +110,7 @@ def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) ->
     protocol = make_protocol(body.protocol, layout, equipment, seed=seed if body.order == "random" else None)
     person = store.subjects.get(body.subject)
     if person.dimensions:
-        require_possible_touches(protocol, person.skeleton())
+        require_possible_touches(protocol, person.skeleton(known_hand(glove.hand)))
     sensors = [str(sensor) for sensor in glove.meta.get("sensors") or layout.sensors]
     state = begin_sampling(
         protocol,
@@ -229,11 +228,3 @@ async def sampling_events(
             yield ServerSentEvent(event="over", data=view.model_dump(mode="json"))
             return
         await asyncio.sleep(LOOK_EVERY_S)
-
-
-def _require_same_hand(store: Store, glove: GloveRecord, subject: str) -> None:
-    person = store.subjects.get(subject)
-    if glove.hand in ("left", "right") and person.known_hand not in (None, glove.hand):
-        raise Conflict(
-            f"glove {glove.name!r} is for the {glove.hand} hand; {subject}'s hand is the {person.hand} one"
-        )

@@ -9,7 +9,8 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from glovecal_models.hand.dimensions import DIMENSIONS
-from glovecal_models.hand.skeleton import Handedness, Palm
+from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.skeleton import Palm
 from glovecal_models.hand.skeleton_document import skeleton_document
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import StoreNeeded

@@ -6,7 +6,8 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from glovecal_models.hand.skeleton import Handedness, hand_skeleton
+from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.hand.skeleton_document import skeleton_document
 from glovecal_service.rest.http.answers import problems
 from glovecal_service.rest.subject.subjects import SkeletonView

@@ -98,7 +98,11 @@ def _others(store: Store, rows: list[TakeRecord]) -> list[TakeRecord]:
     """The subject's other takes, the newest first."""
     ids = {row.id for row in rows}
     every = store.takes.list(subject=rows[0].subject, layout=rows[0].layout)
-    others = [row for row in every if row.id not in ids and row.duration_s <= LONGEST_RANGE_S]
+    others = [
+        row
+        for row in every
+        if row.id not in ids and row.is_of(rows[0].known_hand) and row.duration_s <= LONGEST_RANGE_S
+    ]
     return others[::-1][:MOST_RANGE_TAKES]
 
 

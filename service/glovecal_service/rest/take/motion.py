@@ -13,7 +13,7 @@ from starlette.background import BackgroundTask
 
 from glovecal_client.operating_system import name_for_a_file
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.skeleton import Handedness
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
 from glovecal_service.exports.formats import FORMATS, format_of
@@ -146,10 +146,11 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
     """``hand`` counts where it is given, then what capture said of the glove, then the subject's."""
     record = parts.store.takes.get(take)
     subject = parts.store.subjects.get(record.subject)
+    side = hand or record.known_hand or subject.known_hand
     artifact = None
     if content != "raw":
         chosen = (
-            parts.store.models.active(record.subject, record.layout)
+            parts.store.models.active(record.subject, record.layout, hand or record.known_hand)
             if model is None
             else parts.store.models.get(model)
         )
@@ -159,7 +160,6 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
                 "for raw readings"
             )
         artifact = parts.store.models.load_bytes(chosen.id)
-    side = hand or record.known_hand or subject.known_hand
     if side is None:
         raise Conflict(
             f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "

@@ -8,6 +8,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.takes.session_drift import END, SHAPES, START, session_drift
 from glovecal_service.rest.http.answers import change_problems, problems
 from glovecal_service.rest.http.dependencies import PartsNeeded
@@ -21,6 +22,7 @@ router = APIRouter(prefix="/takes/session-drift", tags=["takes"])
 class SessionDriftRequest(StrictBody):
     subject: SubjectName
     wearing: Annotated[WearingName | None, Field(description="Null: the newest that has both.")] = None
+    hand: Handedness | None = Field(None, description="Of a subject with two gloves, which.")
 
 
 @router.get("", response_model=dict[str, str], summary="Hand shapes of a session", responses=problems())
@@ -34,7 +36,7 @@ def get_shapes() -> dict[str, str]:
 )
 def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> dict[str, Any]:
     """Takes named `start-SHAPE` and `end-SHAPE`, the newest of each; angles by the model that is active."""
-    records = parts.store.takes.list(body.subject)
+    records = [take for take in parts.store.takes.list(body.subject) if take.is_of(body.hand)]
     wearings = (
         [body.wearing] if body.wearing else list(dict.fromkeys(one.wearing for one in reversed(records)))
     )
@@ -48,7 +50,7 @@ def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> dict[str, 
             "end, as glovecal shapes does"
         )
     layout = next(iter(start.values())).layout
-    model = parts.store.models.active(body.subject, layout)
+    model = parts.store.models.active(body.subject, layout, body.hand)
     predictor = None if model is None else parts.predictors.get(model.id)[1]
     first, last = (
         {shape: parts.store.takes.load(record.id) for shape, record in sequence.items()}

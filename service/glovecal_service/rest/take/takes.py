@@ -13,6 +13,7 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 from starlette.background import BackgroundTask
 
+from glovecal_models.hand.handedness import Handedness
 from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_models.takes.take_check import check_take
 from glovecal_models.takes.write_table import write_takes
@@ -22,6 +23,7 @@ from glovecal_service.rest.http.damaged_rows import without_damaged
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.rest.http.request_types import (
+    HandFilter,
     Identifier,
     IdInPath,
     LayoutFilter,
@@ -50,6 +52,7 @@ class Take(BaseModel):
     frames: int
     reference_rows: int
     teaches: bool = Field(description="Whether a calibration can learn from it.")
+    known_hand: Handedness | None = Field(description="Which hand its glove is for; null: nobody said it.")
     hand_shape: str | None = Field(
         description="The session's shape that is held; methods template and two_shapes learn from it."
     )
@@ -106,10 +109,15 @@ class CheckView(BaseModel):
 
 @router.get("", response_model=list[Take], summary="Takes, oldest first", responses=problems())
 def list_takes(
-    store: StoreNeeded, response: Response, subject: SubjectFilter = None, layout: LayoutFilter = None
+    store: StoreNeeded,
+    response: Response,
+    subject: SubjectFilter = None,
+    layout: LayoutFilter = None,
+    hand: HandFilter = None,
 ) -> list[TakeRecord]:
     """Damaged rows are left out and named in `Warning` headers."""
-    return without_damaged(response, lambda: store.takes.list(subject=subject, layout=layout))
+    every = without_damaged(response, lambda: store.takes.list(subject=subject, layout=layout))
+    return [take for take in every if take.is_of(hand)]
 
 
 @router.get("/{id}", response_model=Take, summary="One take", responses=problems())

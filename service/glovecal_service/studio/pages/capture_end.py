@@ -62,13 +62,17 @@ class SamplingEnd:
 
     async def _train(self) -> None:
         try:
-            job = await self._studio.service.post(
-                "/models/train", {"subject": self._view["subject"], "layout": self._view["layout"]}
-            )
+            worn = {"subject": self._view["subject"], "layout": self._view["layout"]}
+            job = await self._studio.service.post("/models/train", worn | {"hand": await self._hand()})
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning", timeout=10_000)
             return
         self._watch.follow(job["id"])
+
+    async def _hand(self) -> str | None:
+        """That its takes are of; None where capture does not know it."""
+        takes = self._view["takes"]
+        return (await self._studio.service.get(f"/takes/{takes[0]}"))["known_hand"] if takes else None
 
     async def _trained(self, job: Mapping[str, Any]) -> None:
         if job["state"] != "done":
@@ -93,7 +97,9 @@ class SamplingEnd:
 
     async def _check_once(self) -> None:
         service, view = self._studio.service, self._view
-        models = await service.get("/models", subject=view["subject"], layout=view["layout"])
+        models = await service.get(
+            "/models", subject=view["subject"], layout=view["layout"], hand=await self._hand()
+        )
         if any(each["facts"].get("quick_check", {}).get("takes") == view["takes"] for each in models):
             with self._after:
                 ui.label("This wearing is checked; its model is on the page Models.")

@@ -10,6 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.glove_and_wearer import hand_of
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import table, text_row
@@ -110,7 +111,7 @@ class SessionPage:
         if self._is_busy or not self._gloves:
             return
         self._is_busy = True
-        subjects: list[str] = []
+        worn: list[tuple[str, str]] = []
         try:
             for shape, ask in self._shapes.items():
                 self._ask.set_text(f"{ask} Recording begins in {PAUSE_S:.0f} s.")
@@ -123,7 +124,7 @@ class SessionPage:
                 await asyncio.sleep(HELD_S)
                 for each in started:
                     stopped = await self._studio.service.post(f"/recordings/{each['id']}/stop")
-                    subjects += [stopped["subject"]] if stopped["subject"] else []
+                    worn += [(stopped["subject"], stopped["glove"])] if stopped["subject"] else []
             self._ask.set_text(f"The {len(self._shapes)} shapes are recorded.")
         except Refusal as refusal:
             self._ask.set_text(f"Stopped: {refusal}")
@@ -132,18 +133,23 @@ class SessionPage:
             self._is_busy = False
         if place == "end":
             await asyncio.sleep(EVERY_S)  # the last takes are being written
-            await self._tell_drift(list(dict.fromkeys(subjects)))
+            await self._tell_drift(list(dict.fromkeys(worn)))
 
-    async def _tell_drift(self, subjects: Sequence[str]) -> None:
+    async def _tell_drift(self, worn: Sequence[tuple[str, str]]) -> None:
+        """``worn``: each subject with a glove."""
         self._drift.clear()
-        for subject in subjects:
+        seen = {each["name"]: each for each in (await self._studio.service.get("/gloves"))["seen"]}
+        for subject, glove in worn:
+            hand = hand_of(seen[glove])
             try:
-                found = await self._studio.service.post("/takes/session-drift", {"subject": subject})
+                found = await self._studio.service.post(
+                    "/takes/session-drift", {"subject": subject, "hand": hand}
+                )
                 said = found["sentence"]
             except Refusal as refusal:
                 said = str(refusal)
             with self._drift:
-                ui.label(f"{subject}: {said}")
+                ui.label(f"{subject}, {hand} hand: {said}" if hand else f"{subject}: {said}")
 
 
 def _act(name: str, do: Any) -> None:

@@ -137,7 +137,9 @@ class WearingForm(_Form):
 
     async def _require_model(self) -> None:
         worn = self._worn
-        models = await self._studio.service.get("/models", subject=worn.subject or None, layout=worn.layout)
+        models = await self._studio.service.get(
+            "/models", subject=worn.subject or None, layout=worn.layout, hand=worn.hand
+        )
         if not any(each["active"] for each in models):
             raise Refusal(409, f"No model is active for {worn.subject or 'nobody'}: sample and train first.")
 

@@ -60,6 +60,11 @@ class GloveAndWearer:
         return self._gloves[self.glove]["layout"]
 
     @property
+    def hand(self) -> str | None:
+        """Which one the glove is for; None where its capture does not know."""
+        return hand_of(self._gloves[self.glove])
+
+    @property
     def subject(self) -> str:
         return str(self._subject.value or "").strip().lower()
 
@@ -71,8 +76,7 @@ class GloveAndWearer:
         known = [each["name"] for each in await self._studio.service.get("/subjects")]
         glove = self._gloves[self.glove]
         if self.subject not in known:
-            hand = glove["hand"] if glove["hand"] in ("left", "right") else None
-            await self._studio.service.post("/subjects", {"name": self.subject, "hand": hand})
+            await self._studio.service.post("/subjects", {"name": self.subject, "hand": self.hand})
         if wearing is not None or glove["subject"] != self.subject:
             body = {"subject": self.subject, "wearing": wearing or glove["wearing"]}
             await self._studio.service.put(f"/gloves/{quote(self.glove)}/wearer", body)
@@ -98,3 +102,8 @@ async def _states(studio: Studio) -> dict[str, Any]:
         return await run_in_threadpool(studio.feeds.states)
     except ClientError:
         return {}
+
+
+def hand_of(glove: Mapping[str, Any]) -> str | None:
+    """Which one a glove is for; None where its capture does not know."""
+    return glove["hand"] if glove.get("hand") in ("left", "right") else None

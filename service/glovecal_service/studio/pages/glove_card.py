@@ -17,6 +17,7 @@ from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.hand.hand_view import HandView, Side
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.explained_joint import ExplainedJoint
+from glovecal_service.studio.pages.glove_and_wearer import hand_of
 from glovecal_service.studio.pages.refine_by_hand import RefineByHand
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
@@ -117,7 +118,7 @@ class GloveCard:
                 heading(2, self._glove)
                 self._word = ui.label("").classes("state-word").props('role="status"')
                 subject, _, hand, _ = self._worn
-                ui.label(", ".join(filter(None, (subject, f"{hand} hand" if hand in _HANDS else ""))))
+                ui.label(", ".join(filter(None, (subject, f"{hand} hand" if hand else ""))))
             self._sentence = ui.label("").classes("glove-sentence")
             self._facts = _facts()
             self._choice = ui.element("div").classes("glove-models")
@@ -163,7 +164,7 @@ class GloveCard:
 
     async def _skeleton(self, glove: Mapping[str, Any]) -> dict[str, Any]:
         """Of the wearer, else of a hand of usual size."""
-        hand = glove.get("hand") if glove.get("hand") in _HANDS else None
+        hand = hand_of(glove)
         if glove.get("subject"):
             with suppress(Refusal):
                 return await self._studio.service.get(
@@ -191,7 +192,9 @@ class GloveCard:
         """The models of the wearer; what is active elsewhere is chosen here."""
         if not glove.get("subject") or not glove.get("layout"):
             return
-        found = await self._studio.service.get("/models", subject=glove["subject"], layout=glove["layout"])
+        found = await self._studio.service.get(
+            "/models", subject=glove["subject"], layout=glove["layout"], hand=hand_of(glove)
+        )
         names = {each["id"]: version_name(each) for each in found}
         active = next((each["id"] for each in found if each["active"]), None)
         if names == self._models and active == self._active:
@@ -220,13 +223,10 @@ class GloveCard:
         self._active = event.value
 
 
-_HANDS = ("left", "right")
-
-
 def _worn(glove: Mapping[str, Any]) -> tuple[Any, ...]:
     """What a card is built for: subject, layout, hand, sensors."""
     sensors = (glove.get("meta") or {}).get("sensors")
-    return glove.get("subject"), glove.get("layout"), glove.get("hand"), str(sensors)
+    return glove.get("subject"), glove.get("layout"), hand_of(glove), str(sensors)
 
 
 def _facts() -> dict[str, ui.label]:

@@ -61,17 +61,17 @@ class ModelsPage:
         self._notice.set_text("" if models else "No model yet: record takes and train one.")
         self._trees.clear()
         with self._trees:
-            for subject, layout in dict.fromkeys((each["subject"], each["layout"]) for each in models):
-                own = [each for each in models if (each["subject"], each["layout"]) == (subject, layout)]
-                self._tree(subject, layout, own)
+            for worn in dict.fromkeys(_worn(each) for each in models):
+                self._tree(*worn, [each for each in models if _worn(each) == worn])
 
-    def _tree(self, subject: str, layout: str, models: Sequence[Mapping[str, Any]]) -> None:
+    def _tree(self, subject: str, layout: str, hand: str | None, models: Sequence[Mapping[str, Any]]) -> None:
+        of_hand = f", {hand} hand" if hand else ""
         with ui.element("section").classes("tree").props() as section:
-            section.props["aria-label"] = f"Models of {subject}"
+            section.props["aria-label"] = f"Models of {subject}{of_hand}"
             with ui.row().classes("tree-head"):
-                heading(2, f"{subject}, {layout}")
+                heading(2, f"{subject}, {layout}{of_hand}")
                 ui.button(
-                    "Return to the model before", on_click=lambda: self._roll_back(subject, layout)
+                    "Return to the model before", on_click=lambda: self._roll_back(subject, layout, hand)
                 ).props("outline no-caps").classes("studio-target")
             known = {each["id"] for each in models}
             for root in (each for each in models if each["parent"] not in known):
@@ -125,8 +125,8 @@ class ModelsPage:
         await self._look()
         self._notice.set_text(f"Model {model['id'][:12]} of {model['subject']} {here}; it is not active.")
 
-    async def _roll_back(self, subject: str, layout: str) -> None:
-        body = {"subject": subject, "layout": layout}
+    async def _roll_back(self, subject: str, layout: str, hand: str | None) -> None:
+        body = {"subject": subject, "layout": layout, "hand": hand}
         await self._do("/models/rollback", body, "The model that was active before is active again.")
 
     async def _do(self, path: str, body: Mapping[str, Any], done: str) -> None:
@@ -137,3 +137,8 @@ class ModelsPage:
             return
         ui.notify(done, position="bottom-right")
         await self._look()
+
+
+def _worn(model: Mapping[str, Any]) -> tuple[str, str, str | None]:
+    """Whose glove it reads: subject, layout and hand."""
+    return model["subject"], model["layout"], model["hand"]

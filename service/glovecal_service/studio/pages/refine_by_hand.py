@@ -137,7 +137,7 @@ class RefineByHand:
             self._busy = False
 
     async def _take_back(self) -> None:
-        which = {key: self._model.get(key) for key in ("subject", "layout")}
+        which = {key: self._model.get(key) for key in ("subject", "layout", "hand")}
         try:
             back = await self._studio.service.post("/models/rollback", which)
         except Refusal as refusal:
