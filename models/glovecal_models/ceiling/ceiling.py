@@ -23,7 +23,7 @@ class Gain:
     """The error of one rotation, or of all, and what the box takes off it beyond its controls."""
 
     rmse_deg: float
-    """Held-out error of the model, not smoothed."""
+    """Of the model on left-out quarters of its takes, not smoothed."""
     ceiling_deg: float
     """With the box, or of the model where the box is no better."""
     lowest_deg: float

@@ -5,6 +5,8 @@ from __future__ import annotations
 from glovecal_models.ceiling.ceiling import Ceiling, Gain
 
 MOST_NAMED = 4
+ERROR = "error on left-out quarters of the takes"
+"""The box leaves out other parts than training does, so this is not the model's held-out error."""
 
 
 def ceiling_sentence(found: Ceiling) -> str:
@@ -14,14 +16,14 @@ def ceiling_sentence(found: Ceiling) -> str:
         where = ", ".join(found.gaining[:MOST_NAMED])
         on = f" It is significant on {where}." if where else ""
         return (
-            f"Something is left to gain: a black box on everything recorded takes the held-out error from"
+            f"Something is left to gain: a black box on everything recorded takes the {ERROR} from"
             f" {gain.rmse_deg:.2f} to {gain.ceiling_deg:.2f} degrees (at most to {gain.lowest_deg:.2f},"
             f" 95 % bound; p = {gain.p_value:.2g}), mostly by {_groups(found)}.{on}"
         )
     if found.verdict == "none" and gain is not None:
         return (
             f"Nothing is left to gain from what was recorded: a black box on all of it takes at most"
-            f" {_at_most(gain)} off the held-out error of {gain.rmse_deg:.2f} degrees."
+            f" {_at_most(gain)} off the {ERROR} of {gain.rmse_deg:.2f} degrees."
             f" {_measurement(found)}"
         )
     return f"Whether anything is left to gain is undecided: {_why(found)}."
@@ -60,6 +62,6 @@ def _why(found: Ceiling) -> str:
         return found.obstacle or "nothing was measured"
     low, high = 100 * gain.low_share, 100 * gain.high_share
     return (
-        f"a black box on everything recorded changes the held-out error of {gain.rmse_deg:.2f} degrees by"
+        f"a black box on everything recorded changes the {ERROR} of {gain.rmse_deg:.2f} degrees by"
         f" {-high:+.0f} to {-low:+.0f} % (95 % interval, {found.takes} takes); record more takes"
     )

@@ -13,7 +13,7 @@ from glovecal_service.views.view import View
 
 
 class GainView(View):
-    rmse_deg: float | None = Field(description="Held-out error of the model.")
+    rmse_deg: float | None = Field(description="Error of the model on left-out quarters of its takes.")
     ceiling_deg: float | None = Field(description="What a black box on everything recorded leaves of it.")
     lowest_deg: float | None = Field(description="With the upper 95 % bound of what the box gains.")
     low_share: float | None = Field(
