@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from further_forms import every_form
 from wandering_reference import WANDER_DEG, with_wander
 
 from glovecal_models.layout import Layout
@@ -95,7 +96,7 @@ class BlindGlove:
     def session(self) -> RecordedSession:
         """The recording; a bystander's column stands in it, its cause does not show."""
         extra = () if self.bystander == "none" else (Cause(self.bystander, strength_deg=BYSTANDER_DEG),)
-        return record_session(self.plan, (*self.causes, *extra))
+        return record_session(self.plan, (*self.causes, *extra), forms_of=every_form)
 
     @property
     def takes(self) -> tuple[Take, ...]:

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from diagnosis_answer import NOTHING
+from further_forms import unlike_open_forms
 from glove_choices import NUISANCES
 from glove_jobs import Row
 from study_figure import StudyFigure
-
-from glovecal_models.simulation.causes.catalogue import unlike_open_forms
 
 JUDGED_SIZE = 1.3
 """Floors at which the first name has to be right."""

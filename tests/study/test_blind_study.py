@@ -9,17 +9,16 @@ import pytest
 from blind_glove import BlindGlove
 from diagnosis_answer import NOTHING, diagnosis_answer
 from finished_gloves import FinishedGloves
+from further_forms import every_form
 from glove_choices import clean, pair, with_cause
 from study_parts import LARGE_SIZE, PARTS, StudyChoices
-
-from glovecal_models.simulation.causes.catalogue import forms
 
 STRONG = ("hysteresis", "creep", "lag", "clock_offset", "warmup_drift", "cross_coupling")
 
 
 def strong(effect: str) -> BlindGlove:
     """The first in a form that a session may draw by itself."""
-    usual = {form.name for form in forms(effect) if not form.set_aside and not form.only_by_name}
+    usual = {form.name for form in every_form(effect) if not form.set_aside and not form.only_by_name}
     made = (with_cause("short", effect, LARGE_SIZE, number) for number in count())
     return next(glove for glove in made if glove is not None and glove.causes[0].form in usual)
 
@@ -50,9 +49,9 @@ def test_set_aside_forms_are_used_only_when_asked_for():
             *(pair(number, 1.3, set_aside=aside) for number in range(3)),
         ]
         used = {(cause.name, cause.form) for glove in gloves for cause in glove.causes}
-        assert {form.set_aside for name, chosen in used for form in forms(name) if form.name == chosen} == {
-            aside
-        }
+        assert {
+            form.set_aside for name, chosen in used for form in every_form(name) if form.name == chosen
+        } == {aside}
 
 
 def test_finished_gloves_are_not_asked_again_unless_the_programs_change(tmp_path):

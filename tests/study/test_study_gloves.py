@@ -8,17 +8,18 @@ from itertools import product
 import numpy as np
 import pytest
 from blind_glove import BlindGlove, Nuisance
+from further_forms import every_form
 from glove_choices import BITS, NUISANCES, RATES_HZ, RECORDED_INPUTS, RECORDED_UNNAMED, clean, with_cause
 from study_parts import LEAD_S, PARTS, QUICK, REMEMBERING, StudyChoices
 from wandering_reference import WANDER_DEG
 
-from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, forms
+from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES
 
 FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=44)
 
 
 def open_forms(name: str) -> set[str]:
-    return {form.name for form in forms(name) if not form.set_aside}
+    return {form.name for form in every_form(name) if not form.set_aside}
 
 
 def test_every_form_and_device_comes_in_turn() -> None:

@@ -13,7 +13,6 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
-from glovecal_models.simulation.causes.catalogue import forms
 from glovecal_models.simulation.causes.form import Cause, Draws, Form, HiddenCause, Stage
 from glovecal_models.simulation.scene import Scene
 from glovecal_models.simulation.session_glove import SessionGlove
@@ -49,11 +48,15 @@ class Hidden:
         return self.form.column(scene, self.draws)
 
 
-def hide(cause: Cause, place: int, glove: SessionGlove, scene: Scene) -> Hidden:
+FormsOf = Callable[[str], tuple[Form, ...]]
+"""The forms of a cause by its name."""
+
+
+def hide(cause: Cause, place: int, glove: SessionGlove, scene: Scene, forms_of: FormsOf) -> Hidden:
     """Choose form, sensors and sizes. ``place`` tells equal causes of one session apart."""
     label = f"{cause.name}/{place}"
     random = np.random.default_rng([glove.plan.seed, 52, zlib.crc32(label.encode())])
-    form = _form(cause, random)
+    form = _form(cause, forms_of(cause.name), random)
     affected = _affected(cause, form, glove.plan.sensors, random)
     if form.shared:
         affected[:] = True
@@ -123,8 +126,7 @@ class _Measure:
         return signal[:, :, self._affected].reshape(-1, int(self._affected.sum()))
 
 
-def _form(cause: Cause, random: np.random.Generator) -> Form:
-    known = forms(cause.name)
+def _form(cause: Cause, known: tuple[Form, ...], random: np.random.Generator) -> Form:
     if cause.form is None:
         drawn = [form for form in known if not form.set_aside and not form.only_by_name] or list(known)
         return drawn[int(random.integers(len(drawn)))]

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from glovecal_models.simulation.causes.catalogue import forms
 from glovecal_models.simulation.causes.form import Cause, HiddenCause, Stage
-from glovecal_models.simulation.hidden import Hidden, hide
+from glovecal_models.simulation.hidden import FormsOf, Hidden, hide
 from glovecal_models.simulation.scene import Scene, play_scene
 from glovecal_models.simulation.session_glove import SessionGlove
 from glovecal_models.simulation.session_plan import SessionPlan, TakeMotion
@@ -65,16 +66,18 @@ class RecordedSession:
         return _record(self.plan, SessionGlove(self.plan), (start,), self._hidden)[0]
 
 
-def record_session(plan: SessionPlan, causes: Sequence[Cause] = ()) -> RecordedSession:
+def record_session(
+    plan: SessionPlan, causes: Sequence[Cause] = (), *, forms_of: FormsOf = forms
+) -> RecordedSession:
     """Record all takes of ``plan`` with ``causes`` acting together, each in its place in the chain.
 
-    Sizes are set so that each cause by itself has its strength on the plan's own takes. Raises BadInput for
-    a name, form or sensor that does not exist.
+    Sizes are set so that each cause by itself has its strength on the plan's own takes. ``forms_of`` may know
+    more forms than the catalogue. Raises BadInput for a name, form or sensor that does not exist.
     """
     glove = SessionGlove(plan)
     starts = schedule(plan)
     scene = play_scene(plan, starts, glove.zero / glove.gain)
-    hidden = tuple(hide(cause, place, glove, scene) for place, cause in enumerate(causes))
+    hidden = tuple(hide(cause, place, glove, scene, forms_of) for place, cause in enumerate(causes))
     recorded = _record_scene(plan, glove, scene, hidden)
     return RecordedSession(
         plan=plan,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from further_forms import every_form
 
 from glovecal_models.calibration.effect_fit import NOISE_SHARE, correspondence_for, fit_with_effects
 from glovecal_models.calibration.effect_request import EffectRequest
@@ -30,7 +31,7 @@ def takes() -> PreparedTakes:
     layout = Layout.from_document(
         {"name": "two", "sensors": list(SENSORS), "rotations": {name: [name] for name in SENSORS}}
     )
-    session = record_session(plan, (Cause("creep", "lost_structure", 2.5),))
+    session = record_session(plan, (Cause("creep", "lost_structure", 2.5),), forms_of=every_form)
     return PreparedTakes.of(session.takes, layout)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from further_forms import every_form
 
 from glovecal_models.diagnosis import actions
 from glovecal_models.diagnosis.candidates import is_memory_of_known
@@ -30,7 +31,7 @@ ARCH = KnownEffect(effect("palm_arch"), JOINTS, (np.empty(0),) * len(JOINTS))
 
 def takes_with(*causes: Cause) -> tuple[Take, ...]:
     plan = SessionPlan(seed=12, sensors=SENSORS, take_s=24.0)
-    return record_session(plan, causes).takes
+    return record_session(plan, causes, forms_of=every_form).takes
 
 
 @pytest.mark.parametrize(

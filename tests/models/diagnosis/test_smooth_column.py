@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from further_forms import every_form
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.smooth_column import (
@@ -51,7 +52,7 @@ def test_what_takes_left_out_leave_is_that_of_the_process_without_them():
 
 @pytest.mark.parametrize(("cause", "form"), [("warmup_drift", "oven_rings"), ("temperature", "quartz_cubic")])
 def test_a_slow_cause_that_turns_back_is_named(cause, form):
-    takes = record_session(PLAN, [Cause(cause, form, 2.0, ("M_PIP",))]).takes
+    takes = record_session(PLAN, [Cause(cause, form, 2.0, ("M_PIP",))], forms_of=every_form).takes
     named = diagnose(takes, LAYOUT, judge_residual=False).named
     assert named is not None
     assert (named.effect, named.where) == (cause, ("M_PIP",))
@@ -70,7 +71,9 @@ def test_equal_times_since_power_on_are_further_apart_soon_after_it():
 def test_pressure_in_a_form_of_its_own_is_named_by_its_column_and_added_at_once():
     """Two and a half waves over the grip: no usual form goes along with that."""
     takes = []
-    for take in record_session(PLAN, [Cause("contact_pressure", "additive", 1e-3)]).takes:
+    for take in record_session(
+        PLAN, [Cause("contact_pressure", "additive", 1e-3)], forms_of=every_form
+    ).takes:
         wave = np.sin(2 * np.pi * 2.5 * take.context["contact_n"] / 8.0)
         readings = take.readings + 2.5 * SessionGlove(PLAN).gain * wave[:, None]
         takes.append(replace(take, readings=readings))

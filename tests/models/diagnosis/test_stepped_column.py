@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from further_forms import every_form
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model_recipe import requested_effects
@@ -23,7 +24,7 @@ LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 
 def recorded(cause: str, form: str, seed: int):
     plan = SessionPlan(seed=seed, bits=12, nuisance="white", take_s=40.0)
-    return record_session(plan, [Cause(cause, form, 2.0)]).takes
+    return record_session(plan, [Cause(cause, form, 2.0)], forms_of=every_form).takes
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from further_forms import every_form
 
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.naming import beside_known, is_beside_known
@@ -24,7 +25,9 @@ from glovecal_models.simulation.session_plan import SessionPlan
 
 
 def improved(seed: int, sensors: tuple[str, ...], *causes: Cause) -> Improvement:
-    takes = record_session(SessionPlan(seed=seed, sensors=sensors, take_s=32.0), causes).takes
+    takes = record_session(
+        SessionPlan(seed=seed, sensors=sensors, take_s=32.0), causes, forms_of=every_form
+    ).takes
     layout = Layout.from_document(
         {"name": "six", "sensors": list(sensors), "rotations": {name: [name] for name in sensors}}
     )

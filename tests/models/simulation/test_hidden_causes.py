@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from further_forms import every_form, unlike_open_forms
 
 from glovecal_models.errors import BadInput
-from glovecal_models.simulation.causes import catalogue
-from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES, forms, unlike_open_forms
+from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES
 from glovecal_models.simulation.causes.form import Cause, Draws, Form
 from glovecal_models.simulation.scene import play_scene
 from glovecal_models.simulation.session import RecordedSession, record_session
@@ -36,7 +36,7 @@ ALL_FORMS = [
         marks=[pytest.mark.slow] if form.only_by_name and not form.set_aside else [],
     )
     for name in KNOWN_CAUSES + UNKNOWN_CAUSES
-    for form in forms(name)
+    for form in every_form(name)
 ]
 
 
@@ -85,7 +85,7 @@ def measured_strength(session: RecordedSession, form: Form) -> float:
 
 @pytest.mark.parametrize(("name", "form"), ALL_FORMS)
 def test_a_hidden_cause_is_as_strong_as_asked_and_changes_nothing_else(name, form):
-    session = record_session(PLAN, [Cause(name, form.name, STRENGTH_DEG)])
+    session = record_session(PLAN, [Cause(name, form.name, STRENGTH_DEG)], forms_of=every_form)
     hidden = session.causes[0]
     times = measured_strength(session, form) / STRENGTH_DEG
     assert 0.5 < times < 2.0 if form.name in ROUGHLY else times == pytest.approx(1.0, abs=0.15)
@@ -107,7 +107,7 @@ def test_a_hidden_cause_is_as_strong_as_asked_and_changes_nothing_else(name, for
 
 @pytest.mark.parametrize("name", KNOWN_CAUSES)
 def test_a_known_cause_has_six_forms_and_three_set_aside_by_each_author(name):
-    known = forms(name)
+    known = every_form(name)
     assert len(known) >= 9
     assert len({form.name for form in known}) == len(known)
     assert len({form.effect for form in known}) == len(known)
@@ -116,7 +116,7 @@ def test_a_known_cause_has_six_forms_and_three_set_aside_by_each_author(name):
 
 def test_the_set_aside_forms_are_as_they_were_written():
     """Nothing of them is changed after the diagnosis was tried on them."""
-    folder = Path(catalogue.__file__).parent / "set_aside"
+    folder = HASHES.parent / "further_forms" / "set_aside"
     listed = dict(line.split()[::-1] for line in HASHES.read_text(encoding="ascii").splitlines())
     found = {
         f"set_aside/{path.relative_to(folder).as_posix()}": hashlib.sha256(path.read_bytes()).hexdigest()
@@ -127,9 +127,11 @@ def test_the_set_aside_forms_are_as_they_were_written():
 
 
 def test_a_form_that_is_set_aside_or_asked_for_by_name_is_never_drawn():
-    aside = {form.name for form in forms("hysteresis") if form.set_aside or form.only_by_name}
+    aside = {form.name for form in every_form("hysteresis") if form.set_aside or form.only_by_name}
     plans = [SessionPlan(seed=seed, wearings=1, takes_per_wearing=1, take_s=6.0) for seed in range(12)]
-    drawn = {record_session(plan, [Cause("hysteresis")]).causes[0].form for plan in plans}
+    drawn = {
+        record_session(plan, [Cause("hysteresis")], forms_of=every_form).causes[0].form for plan in plans
+    }
     assert len(drawn) > 1
     assert not drawn & aside
 
@@ -168,7 +170,7 @@ def test_a_lagging_reading_follows_a_steady_movement_by_its_time(form, share):
     scene = play_scene(PLAN, schedule(PLAN), np.zeros(5))
     size = np.array([0.011, 0.03, 0.05, 0.1, 0.3])
     ramp = 30.0 * np.broadcast_to(scene.time_s[None, :, None], scene.own.shape)
-    effect = next(item.effect for item in forms("lag") if item.name == form)
+    effect = next(item.effect for item in every_form("lag") if item.name == form)
     behind = (ramp - effect(ramp, scene, size, Draws(0, "test", 5)))[0, -1] / 30.0
     np.testing.assert_allclose(behind, share * size, atol=1e-6)
 

@@ -8,7 +8,6 @@ follows a context column of an unfamiliar name, in a curve that rises and falls.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -151,24 +150,9 @@ UNKNOWN_CAUSES = tuple(f"unknown:{name}" for name in FORMS_BY_NAME)
 
 
 def forms(name: str) -> tuple[Form, ...]:
-    """The forms of one cause, those set aside last. Raises BadInput for another name."""
+    """The forms of one cause. Raises BadInput for another name."""
     if name in UNKNOWN_CAUSES:
-        own = FORMS_BY_NAME[name.removeprefix("unknown:")]
-    elif name in KNOWN_CAUSES:
-        own = import_module(f"{PACKAGE}.{name}").FORMS
-    else:
-        raise BadInput(f"no cause {name!r}; {did_you_mean(name, KNOWN_CAUSES + UNKNOWN_CAUSES)}")
-    return (
-        *own, *_further("retired", name), *_further("set_aside", name), *_further("set_aside.unlike", name),
-    )  # fmt: skip
-
-
-def unlike_open_forms(name: str) -> frozenset[str]:
-    """Names of the forms set aside whose author knew the laws of all others and had to find other ones."""
-    return frozenset(form.name for form in _further("set_aside.unlike", name))
-
-
-def _further(folder: str, name: str) -> tuple[Form, ...]:
-    """Those of one folder beside this file; none for a cause that has no file there."""
-    module = f"{PACKAGE}.{folder}.{name.replace(':', '_')}"
-    return import_module(module).FORMS if find_spec(module) is not None else ()
+        return FORMS_BY_NAME[name.removeprefix("unknown:")]
+    if name in KNOWN_CAUSES:
+        return import_module(f"{PACKAGE}.{name}").FORMS
+    raise BadInput(f"no cause {name!r}; {did_you_mean(name, KNOWN_CAUSES + UNKNOWN_CAUSES)}")

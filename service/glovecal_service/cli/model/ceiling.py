@@ -27,8 +27,9 @@ COLUMNS = {
     "p_value": "p",
 }
 LEGEND = (
-    "Error on left-out quarters of the takes, in degrees. ceiling: what a black box on everything recorded leaves of it; at least: "
-    "with the upper 95 % bound of its gain; p: by flipping the sign of whole takes. The box is never served."
+    "Error on left-out quarters of the takes, in degrees. ceiling: what a black box on everything recorded "
+    "leaves of it; at least: with the upper 95 % bound of its gain; p: by flipping the sign of whole takes. "
+    "The box is never served."
 )
 
 
