@@ -7,16 +7,15 @@ from typing import Any
 
 from glovecal_models.effects.base.motions import TAPS
 from glovecal_service.views.next_take import FREE_MOTION
-from glovecal_service.views.renamed_keys import current
 
 SHORT = 12
 LONG_ENOUGH_S = 60
 """Of movement, to tell an unexplained residual from noise."""
 
 
-def next_command(model: str, stored: Mapping[str, Any], subject: str = "") -> str:
-    """For a diagnosis document of that model of ``subject``, also one that an earlier service stored."""
-    found, short = current(stored), model[:SHORT]
+def next_command(model: str, found: Mapping[str, Any], subject: str = "") -> str:
+    """For a diagnosis document of that model of ``subject``."""
+    short = model[:SHORT]
     if found.get("odd_takes"):
         without = "".join(f" --leave-out {take['id']}" for take in found["odd_takes"])
         return _train(subject, found.get("method") or "lmc_gpr") + without

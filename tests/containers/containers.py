@@ -316,7 +316,9 @@ def _stored(client: RestClient, model: str) -> dict[str, Any]:
 
 
 def _before_newest_migration() -> str:
-    """The commit before it; "" where the history does not go so far."""
+    """The commit before it; "" where there is only the first, or the history does not go so far."""
+    if len(list((ROOT / MIGRATIONS).glob("0*.py"))) == 1:
+        return ""
     log = ["git", "log", "-1", "--diff-filter=A", "--format=%P", "--", MIGRATIONS]
     found = subprocess.run(log, cwd=ROOT, capture_output=True, text=True)
     return found.stdout.strip() if re.fullmatch(r"[0-9a-f]{40}", found.stdout.strip()) else ""

@@ -13,7 +13,7 @@ from sqlalchemy import text
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store, migrate, schema
 from glovecal_service.store.database import Database
-from glovecal_service.store.migrate import NewerSchema
+from glovecal_service.store.migrate import UnknownSchema
 from glovecal_service.store.tables import metadata
 
 NEWEST = schema.newest_revision()
@@ -108,7 +108,14 @@ def test_the_data_folder_may_have_any_name(sqlite_settings: Settings) -> None:
 def test_a_newer_schema_is_refused_with_a_sentence(store_settings):
     with Store.open(store_settings) as store, store.database.write() as connection:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
-    with pytest.raises(NewerSchema, match="schema '9999', which this version of Glovecal does not know"):
+    with pytest.raises(UnknownSchema, match="schema '9999', which this version of Glovecal does not know"):
+        Store.open(store_settings)
+
+
+def test_a_schema_of_before_the_first_release_is_refused_with_a_sentence(store_settings):
+    with Store.open(store_settings) as store, store.database.write() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '0006'"))
+    with pytest.raises(UnknownSchema, match="schema '0006', of a version before the first release"):
         Store.open(store_settings)
 
 

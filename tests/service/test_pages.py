@@ -20,7 +20,6 @@ from glovecal_service.report.effects import effect_card
 from glovecal_service.report.error_fall import Fall, FloorBand
 from glovecal_service.report.html import counted_once
 from glovecal_service.report.improvement_page import improvement_page
-from glovecal_service.views.renamed_keys import RENAMED, current
 
 MODEL_ID = "da3a26b60b009b5f723ad22934052eafaf153ce82b8234bd8d25d79c31c7f073"
 CAPTION = Caption(MODEL_ID, "pia", "linear", 2, date(2026, 11, 22))
@@ -126,16 +125,8 @@ def improvement() -> dict[str, Any]:
         ],
         "baselines": {"raw": 4.2}, "noise_floor_deg": {"I_MCP": 0.6},
         "noise_floor_interval_deg": {"I_MCP": [0.5, 0.7]}, "stopped": "nothing_named", "undone": [],
-        "hold_drift": None, "unexplained_residual": False, "next_take": None, "sentences": ["One.", "Two."],
+        "hold_drift": None, "unexplained_residual": None, "next_take": None, "sentences": ["One.", "Two."],
     }  # fmt: skip
-
-
-def older(document: Any) -> Any:
-    """The document under the keys of a service before 2026-11-23."""
-    names = {new: old for old, new in RENAMED.items()}
-    if isinstance(document, dict):
-        return {names.get(key, key): older(value) for key, value in document.items()}
-    return [older(item) for item in document] if isinstance(document, list) else document
 
 
 def test_a_diagnosis_has_a_title_a_summary_and_contents(diagnosis: dict[str, Any]) -> None:
@@ -164,17 +155,6 @@ def test_the_named_effect_is_explained_with_picture_and_parameters(diagnosis: di
     assert "<svg" in part
     assert "1.25" in part
     assert f"{known.parameters[0].name.replace('_', ' ')}, {known.parameters[0].unit}" in part
-
-
-def test_documents_of_an_earlier_service_give_the_same_pages(
-    diagnosis: dict[str, Any], improvement: dict[str, Any]
-) -> None:
-    for document in (diagnosis, improvement):
-        assert older(document) != document
-        assert current(older(document)) == document
-    assert diagnosis_page(older(diagnosis), CAPTION) == diagnosis_page(diagnosis, CAPTION)
-    old = improvement_page(older(improvement), "linear", "pia", CAPTION)
-    assert old == improvement_page(improvement, "linear", "pia", CAPTION)
 
 
 def test_an_improvement_tells_each_step_once(improvement: dict[str, Any]) -> None:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import random
 import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 from filled_store import META, PROTECTED, fill, read_all
-from sqlalchemy import MetaData, Table, select, text, update
+from sqlalchemy import text
 from stored_takes import LAYOUT
 
 from glovecal_service.settings import Settings
-from glovecal_service.store import Store, schema
+from glovecal_service.store import Store
 from glovecal_service.store.errors import DamagedRows, StoreDamaged
 from glovecal_service.store.tables import metadata
 
@@ -192,54 +189,3 @@ def test_a_changed_row_of_postgresql_is_noticed(store):
         connection.execute(text("UPDATE samplings SET version = version + 1"))
     with pytest.raises(StoreDamaged, match="of table samplings was changed after it was written"):
         store.samplings.list()
-
-
-def test_rows_of_an_earlier_schema_are_hashed_and_what_was_damaged_stays_so(store_settings):
-    with Store.open(store_settings) as store:
-        fill(store)
-        before = read_all(store)
-        _as_before_hashes(store)
-        with store.database.write() as connection:
-            jobs = connection.scalars(text("SELECT id FROM jobs ORDER BY id")).all()
-            connection.execute(text("UPDATE models SET method = 'spgp' WHERE parent = 'none'"))
-    assert schema.newest_revision() > "0004"
-    with Store.open(store_settings) as store:
-        assert read_all(store) == before
-        _as_before_hashes(store)
-        with store.database.write() as connection:
-            connection.execute(text("UPDATE models SET method = 'spgp'"))
-            if store.database.is_sqlite:
-                connection.execute(text("UPDATE jobs SET payload = '{' WHERE id = :id"), {"id": jobs[0]})
-    with Store.open(store_settings) as store:
-        with pytest.raises(DamagedRows, match="of table models was changed"):
-            store.models.list()
-        if store.database.is_sqlite:
-            with pytest.raises(DamagedRows, match=f"row '{jobs[0]}' of table jobs is damaged"):
-                store.jobs.list()
-        assert store.takes.list() == before[0]
-
-
-def _as_before_hashes(store: Store) -> None:
-    """Schema 0004: five tables without a hash, the hashes of the other two over NULLs as well."""
-    with store.database.write() as connection:
-        for name in ("takes", "model_takes", "recordings", "samplings", "jobs"):
-            connection.execute(text(f"ALTER TABLE {name} DROP COLUMN row_sha256"))
-        for name in ("models", "activations"):
-            connection.execute(text(f"ALTER TABLE {name} DROP COLUMN hand"))  # of 0007
-            table = Table(name, MetaData(), autoload_with=connection)
-            for row in connection.execute(select(table)).all():
-                values = {column: _plain(value) for column, value in row._mapping.items()}
-                del values["row_sha256"]
-                if name == "activations":
-                    del values["id"]
-                written = json.dumps([name, values], sort_keys=True, separators=(",", ":"))
-                digest = hashlib.sha256(written.encode("ascii")).hexdigest()
-                connection.execute(update(table).where(table.c.id == row.id).values(row_sha256=digest))
-        connection.execute(text("ALTER TABLE gloves DROP COLUMN latency"))  # of 0006
-        connection.execute(text("UPDATE alembic_version SET version_num = '0004'"))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, datetime):
-        return (value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)).isoformat()
-    return value

@@ -1,11 +1,11 @@
-"""The data folder of the version of 2026-11-22, unpacked for one test or several."""
+"""The stored data folder, unpacked for one test or several."""
 
 from __future__ import annotations
 
 import tarfile
 from pathlib import Path
 
-PACKED = Path(__file__).parent / "stored_example" / "data-2026-11-22.tar.xz"
+PACKED = Path(__file__).parent / "stored_example" / "data.tar.xz"
 
 
 def unpacked_example(into: Path) -> Path:

@@ -111,7 +111,7 @@ def stored_effect(name: str, settings: Settings) -> Effect:
     """The effect of a stored model, declared ones included. Raises BadInput."""
     if "declaration" in settings:
         return ExpressionEffect.from_document(settings["declaration"])
-    return effect(name).as_stored(settings)
+    return effect(name)
 
 
 @contextmanager

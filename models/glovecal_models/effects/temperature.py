@@ -2,14 +2,12 @@
 
 from typing import ClassVar
 
-from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import EffectFacts, Rival, Settings
+from glovecal_models.effects.base.facts import Rival
 from glovecal_models.effects.base.motions import CROSSED
-from glovecal_models.effects.base.slow_context_effect import START, SlowContextEffect
+from glovecal_models.effects.base.slow_context_effect import SlowContextEffect
 
 
-class _TemperatureFacts(EffectFacts):
+class Temperature(SlowContextEffect):
     name = "temperature"
     explanation = "The reading changes with the temperature of glove and hand."
     source = "linear temperature coefficients of offset and gain, deg/K; cloth follows within minutes"
@@ -17,16 +15,7 @@ class _TemperatureFacts(EffectFacts):
     rivals: ClassVar = tuple(Rival(name, CROSSED) for name in ("humidity", "supply_sag"))
     context: ClassVar = ("temperature_c",)
 
-
-class Temperature(_TemperatureFacts, SlowContextEffect):
     @property
     def needs_movement(self) -> bool:
         """Single poses show how the reading goes with the temperature, if not how late."""
         return False
-
-    def as_stored(self, settings: Settings) -> Effect:
-        return self if START in settings else _StoredTemperature()
-
-
-class _StoredTemperature(_TemperatureFacts, ContextEffect):
-    """Of models stored before sensors were taken to follow the temperature late."""

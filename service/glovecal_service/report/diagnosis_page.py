@@ -30,7 +30,6 @@ from glovecal_service.report.html import (
     paragraph,
     table,
 )
-from glovecal_service.views.renamed_keys import current
 
 HEADS = ("effect", "where", "error before", "with the effect", "with its control", "significant")
 RESIDUAL_HEADS = (
@@ -55,7 +54,7 @@ NOTHING_NAMED = "No known effect beats its control significantly."
 
 
 def diagnosis_page(
-    stored: Mapping[str, Any],
+    found: Mapping[str, Any],
     caption: Caption | None = None,
     declarations: Sequence[Mapping[str, Any]] = (),
 ) -> str:
@@ -63,7 +62,7 @@ def diagnosis_page(
 
     ``caption`` of the model, where the store has it; ``declarations`` of the user's own effects.
     """
-    found, own = current(stored), declarations_in(declarations)
+    own = declarations_in(declarations)
     of = caption or Caption(str(found.get("model", "")))
     takes, candidates = found.get("takes") or [], found.get("candidates") or []
     rotations, held = found.get("rotations") or {}, found.get("hold_drift")

@@ -11,7 +11,6 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.comparison.noise_floor import reaches_floor
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
-from glovecal_service.views.renamed_keys import current
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def with_control(
     effect was added; None where that is not known. ``square`` (N, R): squared errors without the effect.
     """
     had = {item.name for item in before.effects}
-    evidence = {item.name: current(dict(item.evidence)) for item in model.effects if item.name not in had}
+    evidence = {item.name: dict(item.evidence) for item in model.effects if item.name not in had}
     gained = [item for item in model.effects if "rmse_control_deg" in evidence.get(item.name, ())]
     if not gained:
         return None

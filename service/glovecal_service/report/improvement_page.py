@@ -14,7 +14,6 @@ from glovecal_service.report.effects import effect_card
 from glovecal_service.report.error_fall import error_fall
 from glovecal_service.report.fall_steps import Fall, FloorBand
 from glovecal_service.report.html import Fact, Section, counted, degrees, figure, folded, listed, page, table
-from glovecal_service.views.renamed_keys import current
 
 STOPPED = {
     "noise_floor": "The error is at the noise floor.",
@@ -28,13 +27,12 @@ MEASURED_HOW = (
 
 
 def improvement_page(
-    stored: Mapping[str, Any], method: str, subject: str, caption: Caption | None = None
+    found: Mapping[str, Any], method: str, subject: str, caption: Caption | None = None
 ) -> str:
     """HTML. Keys that an improvement of another version lacks are left out.
 
     ``caption`` of the last model, where the store has it.
     """
-    found = current(stored)
     steps, last = found["steps"], found["steps"][-1]
     of = (
         caption if caption is not None and caption.subject else Caption(str(last.get("model") or ""), subject)

@@ -18,16 +18,18 @@ from glovecal_service.store.database import Database
 from glovecal_service.store.errors import StoreError
 from glovecal_service.store.schema import migrations
 
+FIRST = "0007"
+"""The schema that the first migration makes."""
 ADVISORY_LOCK = 0x676C6F7665
 """Two services that start at once on one PostgreSQL upgrade it one after the other."""
 
 
-class NewerSchema(StoreError):
-    """The database was written by a newer Glovecal; nothing was changed."""
+class UnknownSchema(StoreError):
+    """A newer Glovecal wrote the database, or one before the first release; nothing was changed."""
 
 
 def migrate(database: Database) -> None:
-    """Upgrade to the newest schema in one transaction. Raises NewerSchema, StorageFull, StoreDamaged."""
+    """Upgrade to the newest schema in one transaction. Raises UnknownSchema, StorageFull, StoreDamaged."""
     config = _config()
     known = ScriptDirectory.from_config(config)
     newest = known.get_current_head()
@@ -35,13 +37,13 @@ def migrate(database: Database) -> None:
         present = _present(connection)
     if present == newest:
         return
-    _refuse_newer(known, present, database)
+    _refuse_unknown(known, present, database)
     if present is not None and database.file is not None:
         backup(database.file, database.file.with_name(f"{database.file.name}.before-{newest}"))
     with database.write() as connection:
         if not database.is_sqlite:
             connection.execute(text(f"SELECT pg_advisory_xact_lock({ADVISORY_LOCK})"))
-        _refuse_newer(known, _present(connection), database)
+        _refuse_unknown(known, _present(connection), database)
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
 
@@ -69,10 +71,16 @@ def _present(connection: Connection) -> str | None:
     return MigrationContext.configure(connection).get_current_revision()
 
 
-def _refuse_newer(known: ScriptDirectory, present: str | None, database: Database) -> None:
+def _refuse_unknown(known: ScriptDirectory, present: str | None, database: Database) -> None:
     if present is None or present in {script.revision for script in known.walk_revisions()}:
         return
-    raise NewerSchema(
+    if present < FIRST:
+        raise UnknownSchema(
+            f"the database {database.name} has schema {present!r}, of a version before the first release, "
+            "which is not upgraded; install the version that wrote it and export its models and takes there, "
+            "or name another folder with GLOVECAL_DATA"
+        )
+    raise UnknownSchema(
         f"the database {database.name} has schema {present!r}, which this version of Glovecal does not know"
         f" (its newest is {known.get_current_head()!r}); install the newer Glovecal that wrote it, or restore"
         " a backup"

@@ -13,7 +13,7 @@ from glovecal_service.store.tables import metadata
 
 
 def upgrade(database: Database) -> None:
-    """Upgrade to the newest schema in one transaction. Raises NewerSchema, StorageFull, StoreDamaged.
+    """Upgrade to the newest schema in one transaction. Raises UnknownSchema, StorageFull, StoreDamaged.
 
     Alembic is imported only when there is something to do: every command of a user comes through here.
     """

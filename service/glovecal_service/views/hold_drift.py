@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from glovecal_models.diagnosis.hold_drift import HoldDrift, HoldVerdict
 from glovecal_models.diagnosis.hold_fit import PoseDrift
 from glovecal_models.diagnosis.hold_text import hold_sentence
 from glovecal_models.diagnosis.next_take import hold_next_take
 from glovecal_service.views.next_take import NextTakeView
-from glovecal_service.views.renamed_keys import current_verdict
 from glovecal_service.views.view import View
 
 
@@ -53,7 +50,7 @@ class HeldPoseView(View):
 
 class HoldDriftView(View):
     sentence: str
-    verdict: Annotated[HoldVerdict, BeforeValidator(current_verdict)]
+    verdict: HoldVerdict
     confidence_set: list[str] = Field(description="Causes that these holds cannot tell apart.")
     holds: int
     p_value: float = Field(description="Of the drift common to holds, by flipping the sign of whole holds.")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from glovecal_models.diagnosis.diagnosis import Verdict
 from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step
@@ -17,7 +17,6 @@ from glovecal_service.views.form_curves import LaneCurvesView, curve_views
 from glovecal_service.views.hold_drift import HoldDriftView
 from glovecal_service.views.next_take import NextTakeView
 from glovecal_service.views.noise_floor import NoiseFloorView
-from glovecal_service.views.renamed_keys import current_residual
 from glovecal_service.views.view import View
 
 
@@ -86,9 +85,7 @@ class ImprovementView(View):
     stopped: str = Field(description="noise_floor, nothing_named, ambiguous or not_better.")
     undone: list[AdditionView]
     hold_drift: HoldDriftView | None = None
-    unexplained_residual: Annotated[UnexplainedResidualView | None, BeforeValidator(current_residual)] = (
-        Field(None, description="Of the last diagnosis.")
-    )
+    unexplained_residual: UnexplainedResidualView | None = Field(None, description="Of the last diagnosis.")
     ceiling: CeilingView | None = Field(None, description="Of the last model; null: not asked for.")
     next_take: NextTakeView | None
     sentences: list[str]

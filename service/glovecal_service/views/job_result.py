@@ -1,4 +1,4 @@
-"""Results of jobs, those of earlier versions too, as they are shown now."""
+"""Results of jobs, read back from what was stored."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VIEW_OF: Mapping[str, type[View]] = {
 
 
 def current_result(kind: str, result: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """With present keys; a result that is not what its kind promises is given as it was stored."""
+    """As its view shows it; a result that is not what its kind promises is given as it was stored."""
     if result is None:
         return None
     view = VIEW_OF.get(kind)

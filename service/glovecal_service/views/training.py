@@ -12,7 +12,6 @@ from glovecal_models.regression.kernel_scores import choice_of
 from glovecal_models.regression.regressor import Regressor
 from glovecal_service.plain import plain
 from glovecal_service.views.form_curves import LaneCurvesView, curve_views
-from glovecal_service.views.renamed_keys import current_evidence
 
 
 class EffectView(BaseModel):
@@ -48,7 +47,7 @@ def effect_view(added: AddedEffect) -> dict[str, Any]:
         "settling_s": effect.transient_s(
             added.shape[[name in added.active for name in added.rotations]], added.settings
         ),
-        "evidence": plain(current_evidence(added.evidence)),
+        "evidence": plain(added.evidence),
         "declaration": plain(added.settings.get("declaration")),
     }
 

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel
 
 from glovecal_service.plain import plain
-from glovecal_service.views.renamed_keys import with_current_keys
 
 
 class View(BaseModel):
-    """Made of a result by its ``of``; read back from what was stored, old keys included."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _renamed(cls, document: Any) -> Any:
-        return with_current_keys(document, cls.model_fields)
+    """Made of a result by its ``of``; read back from what was stored."""
 
     def document(self) -> dict[str, Any]:
         """JSON-able; NaN and infinity are null."""

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.context_effect import ContextEffect
 from glovecal_models.effects.base.followed_column import (
     FOLLOWS_S,
     ColumnStart,
@@ -101,39 +100,3 @@ def test_a_sensor_that_follows_late_is_described(name: str):
 
     assert left(columns[:, :4]) > 5 * left(columns)
     assert effect.weight_names(settings)[-1].endswith(f"[c.{effect.context[0]}]_per_min")
-
-
-class TestStoredBefore:
-    """Models keep what they learned: settings without a start have the columns of their time."""
-
-    @pytest.mark.parametrize("name", SLOW)
-    def test_settings_without_a_start_keep_their_columns(self, name: str, signals: list[Signals]):
-        effect, shape = catalogue()[name], np.zeros((3, 0))
-        settings = {**effect.fit_constants(signals), "steepest_per_s": 0.02}
-        del settings["start"]
-        if name == "temperature":
-            del settings["steepest_per_s"]
-        stored = effect.as_stored(settings)
-        assert stored is not effect
-        assert (stored.name, stored.context, stored.rivals) == (effect.name, effect.context, effect.rivals)
-        assert stored.has_memory == (name == "humidity")
-        columns = stored.columns(signals[0], settings, shape)
-        assert columns.shape[2] == len(stored.weight_names(settings)) == (5 if name == "humidity" else 4)
-        assert isinstance(stored, ContextEffect)
-        np.testing.assert_array_equal(
-            columns[:, :, :4], ContextEffect.columns(stored, signals[0], settings, shape)
-        )
-
-    def test_the_slope_of_its_time_is_that_of_the_last_half_minute(self):
-        effect = catalogue()["humidity"]
-        take = Signals(TIME, np.zeros((len(TIME), 1)), context={"humidity_pct": 40.0 + 0.05 * TIME})
-        settings = {**effect.fit_constants([take]), "steepest_per_s": 0.1}
-        del settings["start"]
-        steepness = effect.as_stored(settings).columns(take, settings, np.zeros((1, 0)))[:, 0, -1]
-        assert steepness[0] == 0.0
-        np.testing.assert_allclose(steepness[TIME > 15], 0.5, rtol=0.25)
-
-    def test_new_settings_are_of_the_effect_itself(self, signals: list[Signals]):
-        for name in SLOW:
-            effect = catalogue()[name]
-            assert effect.as_stored(effect.fit_constants(signals)) is effect

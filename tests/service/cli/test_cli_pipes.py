@@ -44,10 +44,10 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Settings, str]:
 
 @contextmanager
 def unread_pipe() -> Iterator[TextIO]:
-    """A real pipe whose reader is gone."""
+    """A real pipe whose reader is gone; each line goes into it at once, however large a Python's buffer."""
     reading, writing = os.pipe()
     os.close(reading)
-    pipe = os.fdopen(writing, "w")
+    pipe = os.fdopen(writing, "w", 1)
     try:
         yield pipe
     finally:

@@ -1,4 +1,4 @@
-"""A running service with its studio, on the data of an earlier version, and a real browser."""
+"""A running service with its studio, on data that were stored before, and a real browser."""
 
 from __future__ import annotations
 

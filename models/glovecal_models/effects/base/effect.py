@@ -80,10 +80,6 @@ class Effect(EffectFacts, ABC):
         unknown = [name for name in self.context if name not in context]
         return f"context {unknown[0]} is not sent" if unknown else None
 
-    def as_stored(self, settings: Settings) -> Effect:
-        """The effect as a model with these settings learned it, where it was another one then."""
-        return self
-
     def knows_wearing(self, settings: Settings, wearing: str) -> bool:
         """Whether it learned what is special about this wearing."""
         return False

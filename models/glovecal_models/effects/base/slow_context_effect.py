@@ -26,7 +26,7 @@ SLOPE_REACH = 1.5
 KNOWN_AFTER_S = 10.0
 """From then on the slope is as good as known: on simulated takes the error it leaves falls no further."""
 START = "start"
-"""Where settings keep how takes begin; models stored before have none."""
+"""Where settings keep how takes begin."""
 
 
 class SlowContextEffect(ContextEffect):

@@ -1,9 +1,9 @@
-"""The first schema: subjects, layouts, gloves, takes, models, activations, recordings, jobs."""
+"""The first schema that is upgraded by later ones; those with lower numbers were never released."""
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0001"
+revision = "0007"
 down_revision = None
 
 NAME = sa.String(64)
@@ -26,6 +26,7 @@ def upgrade() -> None:
         sa.Column("last_seen_at", TIME, nullable=False),
         sa.Column("assigned_at", TIME, nullable=True),
         sa.Column("assigned_run_id", sa.String(length=32), nullable=True),
+        sa.Column("latency", sa.JSON(), nullable=True),
         sa.PrimaryKeyConstraint("name", name="pk_gloves"),
     )
     op.create_table(
@@ -49,6 +50,8 @@ def upgrade() -> None:
         sa.Column("started_at", TIME, nullable=True),
         sa.Column("finished_at", TIME, nullable=True),
         sa.Column("updated_at", TIME, nullable=False),
+        sa.Column("traceback", sa.Text(), nullable=True),
+        sa.Column("row_sha256", NAME, nullable=False, server_default=""),
         sa.PrimaryKeyConstraint("id", name="pk_jobs"),
     )
     op.create_index("ix_jobs_state_created_at", "jobs", ["state", "created_at"])
@@ -70,6 +73,7 @@ def upgrade() -> None:
         sa.Column("facts", sa.JSON(), nullable=False),
         sa.Column("requested_at", TIME, nullable=False),
         sa.Column("updated_at", TIME, nullable=False),
+        sa.Column("row_sha256", NAME, nullable=False, server_default=""),
         sa.PrimaryKeyConstraint("id", name="pk_recordings"),
     )
     op.create_index("ix_recordings_glove", "recordings", ["glove"])
@@ -86,6 +90,7 @@ def upgrade() -> None:
         sa.Column("title", sa.Text(), nullable=False),
         sa.Column("dimensions", sa.JSON(), nullable=False),
         sa.Column("created_at", TIME, nullable=False),
+        sa.Column("hand", sa.String(8), nullable=False, server_default="right"),
         sa.PrimaryKeyConstraint("name", name="pk_subjects"),
     )
     op.create_table(
@@ -111,6 +116,7 @@ def upgrade() -> None:
         sa.Column("parent", NAME, nullable=True),
         sa.Column("facts", sa.JSON(), nullable=False),
         sa.Column("created_at", TIME, nullable=False),
+        sa.Column("hand", sa.String(8), nullable=True),
         sa.Column("row_sha256", NAME, nullable=False),
         sa.ForeignKeyConstraint(["subject"], ["subjects.name"], name="fk_models_subject"),
         sa.PrimaryKeyConstraint("id", name="pk_models"),
@@ -138,6 +144,7 @@ def upgrade() -> None:
         sa.Column("accounting", sa.JSON(), nullable=True),
         sa.Column("facts", sa.JSON(), nullable=False),
         sa.Column("created_at", TIME, nullable=False),
+        sa.Column("row_sha256", NAME, nullable=False, server_default=""),
         sa.ForeignKeyConstraint(["subject"], ["subjects.name"], name="fk_takes_subject"),
         sa.PrimaryKeyConstraint("id", name="pk_takes"),
         sa.UniqueConstraint(
@@ -153,6 +160,7 @@ def upgrade() -> None:
         sa.Column("kind", sa.String(length=16), nullable=False),
         sa.Column("previous", GROWING, nullable=True),
         sa.Column("created_at", TIME, nullable=False),
+        sa.Column("hand", sa.String(8), nullable=True),
         sa.Column("row_sha256", NAME, nullable=False),
         sa.ForeignKeyConstraint(["model"], ["models.id"], name="fk_activations_model"),
         sa.ForeignKeyConstraint(["subject"], ["subjects.name"], name="fk_activations_subject"),
@@ -163,8 +171,30 @@ def upgrade() -> None:
         "model_takes",
         sa.Column("model", NAME, nullable=False),
         sa.Column("take", NAME, nullable=False),
+        sa.Column("row_sha256", NAME, nullable=False, server_default=""),
         sa.ForeignKeyConstraint(["model"], ["models.id"], name="fk_model_takes_model"),
         sa.PrimaryKeyConstraint("model", "take", name="pk_model_takes"),
     )
     op.create_index("ix_model_takes_take", "model_takes", ["take"])
+    op.create_table(
+        "samplings",
+        sa.Column("id", NAME, nullable=False),
+        sa.Column("glove", NAME, nullable=False),
+        sa.Column("subject", NAME, nullable=False),
+        sa.Column("wearing", sa.Text(), nullable=False),
+        sa.Column("layout", NAME, nullable=False),
+        sa.Column("open", sa.Boolean(), nullable=False),
+        sa.Column("version", sa.Integer(), nullable=False),
+        sa.Column("document", sa.JSON(), nullable=False),
+        sa.Column("recordings", sa.JSON(), nullable=False),
+        sa.Column("takes", sa.JSON(), nullable=False),
+        sa.Column("live", sa.JSON(), nullable=False),
+        sa.Column("problem", sa.Text(), nullable=False),
+        sa.Column("created_at", TIME, nullable=False),
+        sa.Column("updated_at", TIME, nullable=False),
+        sa.Column("row_sha256", NAME, nullable=False, server_default=""),
+        sa.ForeignKeyConstraint(["subject"], ["subjects.name"], name="fk_samplings_subject"),
+        sa.PrimaryKeyConstraint("id", name="pk_samplings"),
+    )
+    op.create_index("ix_samplings_open", "samplings", ["open"])
     op.execute("INSERT INTO revision (id, value) VALUES (1, 0)")
