@@ -110,20 +110,17 @@ def add_effect(
     and ``seed`` as for ``train``. The model given stays as it is. Raises BadInput when the effect or a
     rotation is unknown, or when the takes cannot carry it; Cancelled.
     """
-    from glovecal_models.calibration.model_recipe import declared_effects
-    from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.add_effect import add_effect as add_inner
 
     inner, takes = inner_model(model), takes_in(takes)
-    own = declared([effect]) if is_declaration(effect) else []
-    name = own[0].name if own else effect
+    wanted = declared([effect])[0] if is_declaration(effect) else effect
     asked = None if rotations is None else tuple(rotations)
-    with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
-        report(f"looking at the takes for {name}", 0.0)
+    with library_call(progress) as report:
+        report(f"looking at the takes for {wanted if isinstance(wanted, str) else wanted.name}", 0.0)
         found = add_inner(
             inner,
             takes,
-            name,
+            wanted,
             rotations=asked,
             settings=_settings(inner, samples, seed),
             parent_id=CalibrationModel(inner).id,
@@ -148,12 +145,10 @@ def remove_effect(
 
     ``samples`` and ``seed`` as for ``train``. Raises BadInput when it has no such effect; Cancelled.
     """
-    from glovecal_models.calibration.model_recipe import declared_effects
-    from glovecal_models.effects.catalogue import known_by_name
     from glovecal_models.improvement.remove_effect import remove_effect as remove_inner
 
     inner = inner_model(model)
-    with library_call(progress) as report, known_by_name(declared_effects(inner)):
+    with library_call(progress) as report:
         report(f"learning without {effect}", 0.0)
         child = remove_inner(
             inner,

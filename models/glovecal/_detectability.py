@@ -114,36 +114,32 @@ def detectable(
     put in there at once; None for all. ``also``: effects of your own as text, put in by their names as well.
     A trial takes seconds. Raises BadInput, Cancelled.
     """
-    from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-    from glovecal_models.calibration.training_settings import LINEAR_METHODS
     from glovecal_models.diagnosis.detectability.confusability import confusability
     from glovecal_models.diagnosis.detectability.detection import Control, detectability, trial
     from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
-    from glovecal_models.diagnosis.known_effect import known_effects
-    from glovecal_models.effects.catalogue import effect, known_by_name
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
+    from glovecal_models.effects.catalogue import effect
 
     recorded, own = takes_in(takes), declared(also)
     names = [effects] if isinstance(effects, str) else list(effects)
     names = list(dict.fromkeys([*names, *(item.name for item in own)]))
-    inner = None if model is None else inner_model(model)
-    of_model = [] if inner is None else declared_effects(inner)
-    with library_call(progress) as report, known_by_name([*of_model, *own]):
-        if inner is None:
-            session = SurrogateSession.of(recorded, layout_for(layout, recorded))
+    with library_call(progress) as report:
+        if model is None:
+            on = ModelOnTakes(tuple(recorded), layout_for(layout, recorded), own=tuple(own))
         else:
-            linear = inner.method in LINEAR_METHODS
-            repaired = repaired_takes(recorded, requested_effects(inner))
-            session = SurrogateSession.of(repaired, inner.layout, linear=linear, known=known_effects(inner))
+            on = ModelOnTakes.of(inner_model(model), recorded, own)
+        session, own_names = SurrogateSession.of(on), {item.name: item for item in on.own}
         report("comparing effects with each other", 0.0)
-        alike = confusability(session.problem)
+        alike = confusability(session.problem, declared=on.own)
         report("trials with nothing put in", 0.05)
         nothing = [trial(session, None, (), 0.0, seed=seed + i, cancelled=cancelled) for i in range(trials)]
         found = []
         for number, name in enumerate(names):
             report(f"trials of {name}", 0.1 + 0.9 * number / max(len(names), 1))
+            put_in = own_names.get(name) or effect(name)
             found.append(
                 detectability(
-                    session, effect(name), rotations, sizes_deg, trials=trials, seed=seed, cancelled=cancelled
+                    session, put_in, rotations, sizes_deg, trials=trials, seed=seed, cancelled=cancelled
                 )
             )
     return Detectable(tuple(found), Control(tuple(item for item in nothing if item is not None)), alike)

@@ -115,28 +115,20 @@ def diagnose(
     such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is of the controls. Raises BadInput,
     Cancelled.
     """
-    from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-    from glovecal_models.calibration.training_settings import LINEAR_METHODS
     from glovecal_models.comparison.noise_floor import rotation_noise
     from glovecal_models.comparison.odd_takes import fitting, odd_takes
     from glovecal_models.comparison.residuals import residuals
-    from glovecal_models.diagnosis.diagnose import diagnose as diagnose_inner
-    from glovecal_models.diagnosis.known_effect import known_effects
-    from glovecal_models.effects.catalogue import known_by_name
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 
     inner, takes = inner_model(model), takes_in(takes)
     own = declared(also)
-    with library_call(progress) as report, known_by_name([*declared_effects(inner), *own]):
+    with library_call(progress) as report:
         report("holding the takes against each other", 0.0)
         odd = odd_takes(takes, inner.layout)
         takes = fitting(takes, odd)
         report("measuring the noise floors", 0.0)
         noise = rotation_noise(residuals(inner, takes))
-        found = diagnose_inner(
-            repaired_takes(takes, requested_effects(inner)),
-            inner.layout,
-            linear=inner.method in LINEAR_METHODS,
-            known=known_effects(inner),
+        found = ModelOnTakes.of(inner, takes, own).diagnosed(
             noise_floors={n: item.floor for n, item in noise.items() if item.floor is not None},
             seed=seed,
             cancelled=cancelled,

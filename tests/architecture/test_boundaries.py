@@ -122,3 +122,10 @@ def test_eval_and_exec_are_not_used():
                 if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
             ]
             assert not {"eval", "exec", "compile"} & set(calls), path
+
+
+def test_nothing_is_known_by_what_stands_around_it() -> None:
+    """What a function needs is given to it: no registry in a context variable."""
+    for folder in SOURCES.values():
+        for path in sorted(folder.rglob("*.py")):
+            assert "contextvars" not in path.read_text(encoding="utf-8"), path

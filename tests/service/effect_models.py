@@ -34,6 +34,11 @@ def added(
     return AddedEffect(name, rotations, settings, grid, np.tile(learned, (lanes, 1)), np.zeros(lanes))
 
 
+FOLLOWED = {
+    "start": {"noise": 0.1, "slope": 0.0, "slope_sd": 0.01, "curvature_sd": 1e-4},
+    "steepest_per_s": 0.05,
+}
+"""Settings of an effect whose sensors follow a context column late."""
 HYSTERESIS = added("hysteresis", (5.0,), (0.4, 0.3, 0.2))
 CREEP_WEIGHTS = (0.05, 0.05, 0.15, 0.03, 0.02, 0.1)
 CREEP = added("creep", (0.5, 1.1, 2.5), CREEP_WEIGHTS, ("I_MCP", "M_MCP"), settings=UNITS)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import zenoh
-from effect_models import HYSTERESIS, UNITS, added, model_with
+from effect_models import FOLLOWED, HYSTERESIS, UNITS, added, model_with
 from realtime_support import (
     LAYOUT,
     WireGlove,
@@ -147,7 +147,7 @@ def test_effects_are_told_the_wearing_and_the_context(
 ) -> None:
     shift = added("donning_shift", (), (3.0, 0.0), settings={"wearings": ["monday"], **UNITS})
     span = {"low": 20.0, "high": 30.0, "usual": 25.0}
-    heat = added("temperature", (), (10.0, 0.0), settings={**span, **UNITS})
+    heat = added("temperature", (), (10.0, 0.0), settings={**span, **FOLLOWED, **UNITS})
     model = replace(model_with(HYSTERESIS, shift, heat), subject="effie")
     store.subjects.create("effie")
     record = store.models.add(

@@ -6,21 +6,20 @@ from dataclasses import dataclass, field
 
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.catalogue import effect
 
 
 @dataclass(frozen=True)
 class EffectRequest:
     """An effect and the rotations it is on."""
 
-    name: str
+    effect: Effect
     rotations: tuple[str, ...]
     settings: Settings = field(default_factory=dict)
     """What is known already: the clocks' offsets."""
 
     @property
-    def effect(self) -> Effect:
-        return effect(self.name)
+    def name(self) -> str:
+        return self.effect.name
 
     @property
     def has_columns(self) -> bool:

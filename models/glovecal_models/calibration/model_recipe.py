@@ -11,6 +11,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.kernel_scores import kernel_of
 from glovecal_models.regression.regressor import RuleRegressor
@@ -28,7 +29,7 @@ def requested_effects(model: CalibrationModel) -> tuple[EffectRequest, ...]:
         settings = item.settings
         if item.weights.shape[1]:
             settings = item.effect.settings_with_found({}, item.settings)
-        merged[item.name] = EffectRequest(item.name, tuple(dict.fromkeys(rotations)), settings)
+        merged[item.name] = EffectRequest(item.effect, tuple(dict.fromkeys(rotations)), settings)
     return tuple(merged.values())
 
 
@@ -59,6 +60,12 @@ def declared_effects(model: CalibrationModel) -> list[Effect]:
     """The declared effects that a model holds."""
     found = {item.name: item.effect for item in model.effects if "declaration" in item.settings}
     return list(found.values())
+
+
+def effect_named(model: CalibrationModel, name: str) -> Effect:
+    """The model's own declared effect of that name, else the catalogue's. Raises BadInput."""
+    own = {item.name: item for item in declared_effects(model)}
+    return own[name] if name in own else effect(name)
 
 
 def declaration_of(model: CalibrationModel, name: str) -> Mapping[str, Any] | None:

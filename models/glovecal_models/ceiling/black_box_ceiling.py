@@ -9,13 +9,14 @@ model nor the box has seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from glovecal_models.calibration.effect_fit import optima_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import (
+    declared_effects,
     repaired_takes,
     requested_effects,
     settings_of,
@@ -34,6 +35,7 @@ from glovecal_models.ceiling.recorded_columns import (
     recorded_columns,
 )
 from glovecal_models.ceiling.rotation_rows import RotationRows, joined, products_of
+from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.progress import Cancel, Report, part, stop_if
 from glovecal_models.takes.take import Take
@@ -77,6 +79,7 @@ def black_box_ceiling(
         report=part(report, 0.0, 0.25, "held-out error"),
     )
     found = _of_errors(prepared, names, errors, seed, limits, cancelled, report)
+    found = replace(found, unrecorded=_unrecorded(prepared.takes, declared_effects(model)))
     if report:
         report("done", 1.0)
     return found
@@ -185,8 +188,7 @@ def _summed_up(
             f"{100 * changing:.0f} % of the squared error of {worst} changes from take to take, and"
             f" {len(prepared.takes)} takes are too few to tell with what"
         )
-        unrecorded = _unrecorded(prepared.takes)
-        return Ceiling("undecided", overall, rotations, {}, unrecorded, len(prepared.takes), why, limits)
+        return Ceiling("undecided", overall, rotations, {}, (), len(prepared.takes), why, limits)
     gaining = [name for name, gain in rotations.items() if is_gain(gain, limits, len(rotations))]
     groups = {}
     if verdict == "gain":
@@ -194,14 +196,13 @@ def _summed_up(
         rise = {name: float(np.mean([item.groups[name] for item in of])) for name in GROUPS}
         ranked = sorted(GROUPS, key=lambda name: -rise[name])
         groups = {name: float(np.sqrt(rise[name])) for name in ranked if rise[name] > 0}
-    return Ceiling(
-        verdict, overall, rotations, groups, _unrecorded(prepared.takes), len(prepared.takes), None, limits
-    )
+    return Ceiling(verdict, overall, rotations, groups, (), len(prepared.takes), None, limits)
 
 
-def _unrecorded(takes: Sequence[Take]) -> tuple[str, ...]:
+def _unrecorded(takes: Sequence[Take], own: Sequence[Effect]) -> tuple[str, ...]:
+    """Columns that effects ask for, the user's ``own`` too, and that no take has."""
     recorded = {name for take in takes for name in take.context}
-    asked = dict.fromkeys(column for effect in catalogue().values() for column in effect.context)
+    asked = dict.fromkeys(column for effect in (*catalogue().values(), *own) for column in effect.context)
     return tuple(name for name in asked if name not in recorded)
 
 

@@ -99,17 +99,18 @@ def actions_for(
     seed: int = 0,
     saved_by_known: Mapping[str, float] = NOTHING_SAVED,
     wholes: Sequence[Effect] = (),
+    own: Sequence[Effect] = (),
 ) -> tuple[Action, ...]:
     """One for each rotation and effect, those that save most first. ``has``: effects that are on a rotation
     already, as pairs; ``linear``: whether the base is a straight line of the measuring sensor;
     ``saved_by_known``: degrees squared that the model's effects save on each rotation; ``wholes``: those of
-    its effects that others seem to explain a part of."""
+    its effects that others seem to explain a part of; ``own``: effects that the user declared."""
     found: list[Action] = []
     done: set[tuple[str, str]] = set()
     for item in associations:
-        action = _action(item, design, layout, has, linear, seed)
+        action = _action(item, design, layout, has, linear, seed, own)
         least = design.limits.beside_known_share * saved_by_known.get(item.rotation, 0.0)
-        is_of_known = _is_of_known(action, design, wholes)
+        is_of_known = _is_of_known(action, design, wholes, own)
         action = replace(action, least_saved_square=least, is_of_known=is_of_known)
         key = (item.rotation, action.effect or action.method or item.column)
         if key not in done:
@@ -125,12 +126,13 @@ def _action(
     has: Set[tuple[str, str]],
     linear: bool,
     seed: int,
+    own: Sequence[Effect],
 ) -> Action:
     sensor = _sensor_of(item.column, layout)
     if linear and sensor is not None and sensor in layout.correspondence(item.rotation).sensors:
         return Action(item, None, method=TRAIN_OTHERWISE)
     best = Action(item, None)
-    for each in explaining(item.column, sensor):
+    for each in explaining(item.column, sensor, own):
         if (each.name, item.rotation) in has:
             continue
         rmse = formed_rmse(design, each, design.rotations.index(item.rotation), seed)
@@ -144,13 +146,16 @@ def _action(
     return best
 
 
-def _is_of_known(action: Action, design: ForwardDesign, wholes: Sequence[Effect]) -> bool:
+def _is_of_known(
+    action: Action, design: ForwardDesign, wholes: Sequence[Effect], own: Sequence[Effect]
+) -> bool:
     if action.effect is None or not action.saves:
         return False
     share = action.saved_share or 0.0
     if any(action.effect in each.also_explained_by and share < each.also_explained_share for each in wholes):
         return True
-    return is_memory_of_known(design, effect(action.effect), design.rotations.index(action.rotation))
+    asked = next((item for item in own if item.name == action.effect), None) or effect(action.effect)
+    return is_memory_of_known(design, asked, design.rotations.index(action.rotation))
 
 
 def _saved(action: Action) -> float:

@@ -57,6 +57,7 @@ def diagnose(
     effects: Sequence[Effect] | None = None,
     signatures: bool = True,
     judge_residual: bool = True,
+    own: Sequence[Effect] = (),
     noise_floors: Mapping[str, NoiseFloor] | None = None,
     found_before: FoundBefore | None = None,
     seed: int = 0,
@@ -64,7 +65,8 @@ def diagnose(
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Diagnosis:
-    """``known``: effects the model has already; they are part of the base. ``limits`` decide the verdicts.
+    """``known``: effects the model has already; they are part of the base. ``own``: effects that the user
+    declared, compared with the catalogue's. ``limits`` decide the verdicts.
 
     Without ``signatures`` and ``judge_residual`` only the naming is worked out, in less time.
     ``noise_floors``: of these takes, where they were measured before; None: they are measured.
@@ -81,7 +83,7 @@ def diagnose(
     progress("preparing the takes", 0.0)
     problem = DiagnosisProblem.of(takes, layout, linear, known, limits)
     design = problem.design()
-    every = candidates(design.signals)
+    every = candidates(design.signals, own)
     tried = every if effects is None else list(effects)
     by_name = {item.name: item for item in (*every, *tried)}
     if are_pose_labels(takes):

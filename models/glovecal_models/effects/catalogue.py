@@ -5,12 +5,9 @@ A package of one's own adds an effect by an entry point that names its class; no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import entry_points
-from types import MappingProxyType
 from typing import Any
 
 from glovecal_models.effects.base.effect import Effect
@@ -26,15 +23,13 @@ from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 
 GROUP = "glovecal.effects"
-_DECLARED: ContextVar[Mapping[str, Effect]] = ContextVar("declared effects", default=MappingProxyType({}))
 DeclaredEffect = ExpressionEffect
 """A user's own effect, declared in one line of text."""
 
 
 def catalogue() -> dict[str, Effect]:
-    """Every effect by its name, with those of ``known_by_name``. Raises BadInput for an entry point that is
-    none."""
-    return {**registered_effects(), **_DECLARED.get()}
+    """Every effect by its name. Raises BadInput for an entry point that is none."""
+    return dict(registered_effects())
 
 
 @cache
@@ -64,18 +59,20 @@ def effect(name: str) -> Effect:
     return known[name]
 
 
-def candidates(takes: Sequence[Signals]) -> list[Effect]:
-    """The catalogue, and a smooth curve of each recorded context column that nothing in it asks for."""
-    known = list(catalogue().values())
+def candidates(takes: Sequence[Signals], own: Sequence[Effect] = ()) -> list[Effect]:
+    """The catalogue, a user's ``own`` effects, and a smooth curve of each recorded context column that none
+    of them asks for."""
+    known = [*catalogue().values(), *own]
     familiar = sorted({name for item in known for name in item.context})
     unfamiliar = unfamiliar_columns(takes, familiar)
     return [*known, *(ContextDependence.of(name, takes) for name in unfamiliar)]
 
 
-def explaining(column: str, sensor: str | None) -> list[Effect]:
+def explaining(column: str, sensor: str | None, own: Sequence[Effect] = ()) -> list[Effect]:
     """Effects that may be behind an error that goes along with ``column``, as ``glovecal where`` calls it:
-    those of the catalogue, and last what only names the column. ``sensor`` reads it, where one does."""
-    found = [item for item in catalogue().values() if item.has_columns and item.may_show_in(column)]
+    those of the catalogue, a user's ``own``, and last what only names the column. ``sensor`` reads it, where
+    one does."""
+    found = [item for item in (*catalogue().values(), *own) if item.has_columns and item.may_show_in(column)]
     kind, _, name = column.partition(" ")
     if kind == "context":
         return found or [ContextDependence(name)]
@@ -112,16 +109,3 @@ def stored_effect(name: str, settings: Settings) -> Effect:
     if "declaration" in settings:
         return ExpressionEffect.from_document(settings["declaration"])
     return effect(name)
-
-
-@contextmanager
-def known_by_name(effects: Sequence[Effect]) -> Iterator[None]:
-    """Within the block ``effects`` answer to their names; other threads do not see them.
-
-    A declared effect belongs to the models that hold it: two models may each have a ``strap`` of their own.
-    """
-    before = _DECLARED.set({**_DECLARED.get(), **{item.name: item for item in effects}})
-    try:
-        yield
-    finally:
-        _DECLARED.reset(before)

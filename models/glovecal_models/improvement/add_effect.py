@@ -15,6 +15,7 @@ from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import (
+    effect_named,
     repaired_takes,
     requested_effects,
     settings_of,
@@ -27,7 +28,6 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.base.signature_effect import LiveCheck, SignatureEffect
-from glovecal_models.effects.catalogue import effect as known_effect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_interval import add_interval
 from glovecal_models.improvement.addition import Addition, total_rmse_deg
@@ -42,7 +42,7 @@ from glovecal_models.takes.take import Take
 def add_effect(
     model: CalibrationModel,
     takes: Sequence[Take],
-    name: str,
+    effect: str | Effect,
     *,
     rotations: Sequence[str] | None = None,
     constants: dict[str, Any] | None = None,
@@ -57,7 +57,7 @@ def add_effect(
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> Addition:
-    """Learn ``model`` anew with effect ``name`` on ``rotations`` (default: all measured ones).
+    """Learn ``model`` anew with ``effect``, or that of a name, on ``rotations`` (default: all measured ones).
 
     ``takes`` are the training takes. ``constants``: settings of an effect without columns, such as the
     clocks' offsets (default: as they are found in the takes). ``before`` saves measuring the parent,
@@ -67,7 +67,8 @@ def add_effect(
     that widens the interval is judged by its claim (``add_interval``). Raises BadInput for an unknown effect
     or rotation, or when the takes cannot carry it; Cancelled.
     """
-    effect = known_effect(name)
+    effect = effect_named(model, effect) if isinstance(effect, str) else effect
+    name = effect.name
     settings = settings_of(model, settings)
     least_gain = limits.least_gain if least_gain is None else least_gain
     has = requested_effects(model)
@@ -75,7 +76,7 @@ def add_effect(
         proposal = proposed(model, takes, effect, rotations, cancelled, limits.diagnosis)
         constants, rotations = proposal.constants, proposal.rotations or rotations
     chosen = _chosen(model, effect, rotations)
-    fresh = EffectRequest(name, chosen, dict(constants or {}))
+    fresh = EffectRequest(effect, chosen, dict(constants or {}))
     wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     if isinstance(effect, IntervalEffect):
@@ -107,7 +108,7 @@ def add_effect(
     if fresh.has_columns and least_gain >= 0 and 0 < len(kept) < len(chosen):
         judged = [item for item in judged or kept if item in kept] or None
         found = add_effect(
-            model, takes, name, rotations=kept, constants=constants, settings=settings, judged=judged,
+            model, takes, effect, rotations=kept, constants=constants, settings=settings, judged=judged,
             before=before.of(kept), least_gain=least_gain, parent_id=parent_id, take_hashes=take_hashes,
             limits=limits, cancelled=cancelled, report=report,
         )  # fmt: skip
@@ -202,7 +203,7 @@ def _joined(has: Sequence[EffectRequest], fresh: EffectRequest) -> EffectRequest
     if before is None:
         return fresh
     return EffectRequest(
-        fresh.name,
+        fresh.effect,
         tuple(dict.fromkeys((*before.rotations, *fresh.rotations))),
         fresh.settings or before.settings,
     )

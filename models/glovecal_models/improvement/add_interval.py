@@ -75,7 +75,7 @@ def add_interval(
     )
     kept = tuple(item for item in model.effects if item.name != fresh.name)
     child = replace(model, effects=(*kept, added), parent=parent_id, takes=tuple(take_hashes) or model.takes)
-    wanted = (*others, EffectRequest(fresh.name, rotations, learned))
+    wanted = (*others, EffectRequest(fresh.effect, rotations, learned))
     return Addition(
         fresh.name, fresh.rotations, True, errors, errors, child, wanted, added.described(), claim=claim
     )

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.diagnosis.candidates import assessed
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.formed_error import formed_control_share
 from glovecal_models.diagnosis.forward_basis import ForwardBasis
 from glovecal_models.diagnosis.forward_design import forward
-from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.problem import measured_joints
 from glovecal_models.diagnosis.resampled import SMOOTHING, bridge_s, resampled, smoothed
 from glovecal_models.effects.base.assessment import Assessment
@@ -49,12 +48,11 @@ def share_left_by_control(
         return None
     bridge = bridge_s(takes)
     even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
-    known = [item for item in known_effects(model) if item.effect.name != effect.name]
-    linear = model.method in LINEAR_METHODS
+    on = ModelOnTakes.of_repaired(model, takes).without(effect.name)
     basis = ForwardBasis.of(
-        even, model.layout, joints, linear=linear, same_angle_share=limits.same_angle_share
+        even, model.layout, joints, linear=on.linear, same_angle_share=limits.same_angle_share
     )
-    direction = forward(basis, joints, known=known, limits=limits)
+    direction = forward(basis, joints, known=on.known, limits=limits)
     if known_share is None:
         found, _ = assessed(direction, [effect], np.random.default_rng(0), set(), progress)
         judged = next((item for item in found if item.effect == effect.name), None)

@@ -20,7 +20,7 @@ from glovecal_models.calibration.model_recipe import (
 )
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import noise_of, train
-from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
@@ -30,9 +30,8 @@ from glovecal_models.comparison.noise_floor import noise_floors
 from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
-from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.text import action_sentence
 from glovecal_models.effects.base.signature_effect import FoundBefore, SignatureEffect
 from glovecal_models.effects.catalogue import catalogue, effect
@@ -151,8 +150,7 @@ class _Loop:
             return True
         self._say("diagnosing the residual", share)
         takes = self._repaired()
-        self.diagnosis = diagnose(
-            takes, self.layout, linear=self.settings.method in LINEAR_METHODS, known=known_effects(model),
+        self.diagnosis = ModelOnTakes.of_repaired(model, takes).diagnosed(
             noise_floors=self._known_floors(takes), found_before=self.found_before, seed=self.seed,
             limits=self.limits.diagnosis, cancelled=self.cancelled,
         )  # fmt: skip

@@ -9,11 +9,10 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects, trained_rotations
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
-from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.signatures import are_held_levels, own_sensors, static_errors
 from glovecal_models.effects.base.signature_effect import FoundBefore, Proposal, Recorded, SignatureEffect
@@ -122,15 +121,15 @@ def _by_comparison(
     cancelled: Cancel | None,
     limits: DiagnosisLimits,
 ) -> Proposal | None:
-    found = diagnose(
-        takes,
-        model.layout,
-        linear=model.method in LINEAR_METHODS,
-        known=[item for item in known_effects(model) if item.effect.name not in (effect.name, *effect.alike)],
-        effects=[effect],
-        signatures=False,
-        limits=limits,
-        cancelled=cancelled,
+    found = (
+        ModelOnTakes.of_repaired(model, takes)
+        .without(effect.name, *effect.alike)
+        .diagnosed(
+            effects=[effect],
+            signatures=False,
+            limits=limits,
+            cancelled=cancelled,
+        )
     )
     assessed = next((item for item in found.assessments if item.effect == effect.name), None)
     constants = effect.constants_of(assessed, [take.name for take in takes]) if assessed else None

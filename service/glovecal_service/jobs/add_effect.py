@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.model_recipe import declared_effects
-from glovecal_models.effects.catalogue import known_by_name
+from glovecal_models.effects.catalogue import effect_of_declaration
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.progress import Report
 from glovecal_service.jobs.child_record import artifact_array, keep_child
-from glovecal_service.jobs.declared_effects import declared
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
 from glovecal_service.jobs.task_key import task_key
@@ -80,21 +78,20 @@ class AddEffectJob:
 def run(work: AdditionWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
-    with known_by_name([*declared_effects(model), *declared(work.declaration)]):
-        known = model.error_estimate.get("rmse_deg")
-        error = "" if known is None else f", held-out error {known:.2f} degrees so far"
-        report(f"looking at the takes for {work.effect}{error}", 0.0)
-        found = add_effect(
-            model,
-            on.takes,
-            work.effect,
-            rotations=work.rotations,
-            settings=on.settings,
-            parent_id=on.id,
-            take_hashes=on.take_hashes,
-            cancelled=cancelled,
-            report=report,
-        )
+    known = model.error_estimate.get("rmse_deg")
+    error = "" if known is None else f", held-out error {known:.2f} degrees so far"
+    report(f"looking at the takes for {work.effect}{error}", 0.0)
+    found = add_effect(
+        model,
+        on.takes,
+        work.effect if work.declaration is None else effect_of_declaration(work.declaration),
+        rotations=work.rotations,
+        settings=on.settings,
+        parent_id=on.id,
+        take_hashes=on.take_hashes,
+        cancelled=cancelled,
+        report=report,
+    )
     return TaskResult(
         {"artifact": artifact_array(found.model)} if found.added else {}, AdditionView.of(found).document()
     )

@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.model_recipe import declared_effects
 from glovecal_models.ceiling.ceiling import RECIPE
-from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.progress import Report
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.model_work import ModelWork, takes_of, text_in
@@ -53,10 +51,9 @@ def run(work: CeilingWork, cancelled: Callable[[], bool], report: Report) -> Tas
     from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling  # heavy
 
     model = work.on.model
-    with known_by_name(declared_effects(model)):
-        found = black_box_ceiling(
-            model, work.on.takes, work.on.settings, seed=work.seed, cancelled=cancelled, report=report
-        )
+    found = black_box_ceiling(
+        model, work.on.takes, work.on.settings, seed=work.seed, cancelled=cancelled, report=report
+    )
     view = CeilingView.of(found)
     assert view is not None
     return TaskResult({}, view.document())

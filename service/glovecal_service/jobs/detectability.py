@@ -9,11 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
-from glovecal_models.diagnosis.known_effect import known_effects
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.catalogue import catalogue, effect, effect_of_declaration, known_by_name
+from glovecal_models.effects.catalogue import catalogue, effect, effect_of_declaration
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Report
@@ -103,30 +100,28 @@ class DetectabilityJob:
 def run(work: DetectabilityWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, Cancelled."""
     from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession  # heavy
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 
     session = work.session
     own = [effect_of_declaration(item) for item in session.declarations]
     if session.model is None:
-        takes, linear, known, of_model = session.takes, False, (), []
+        on = ModelOnTakes(session.takes, session.layout, own=tuple(own))
     else:
-        model = load(session.artifact, expected_id=session.model)
-        takes = repaired_takes(session.takes, requested_effects(model))
-        linear, known = model.method in LINEAR_METHODS, known_effects(model)
-        of_model = declared_effects(model)
-    with known_by_name([*of_model, *own]):
-        fitted = SurrogateSession.of(takes, session.layout, linear=linear, known=known)
-        if work.part == "confusability":
-            return TaskResult({}, _alike(fitted))
-        return TaskResult({}, _tried(fitted, work, cancelled, report))
+        on = ModelOnTakes.of(load(session.artifact, expected_id=session.model), session.takes, own)
+    fitted = SurrogateSession.of(on)
+    if work.part == "confusability":
+        return TaskResult({}, _alike(fitted))
+    return TaskResult({}, _tried(fitted, work, cancelled, report))
 
 
 def _alike(session: Any) -> dict[str, Any]:
     from glovecal_models.diagnosis.detectability.confusability import confusability
 
+    alike = confusability(session.problem, declared=session.on.own)
     every = np.concatenate(session.residual)
     size = np.sqrt(np.nanmean(every**2, axis=0))
     return {
-        "confusability": ConfusabilityView.of(confusability(session.problem)).document(),
+        "confusability": ConfusabilityView.of(alike).document(),
         "residual_deg": dict(zip(session.rotations, map(float, size), strict=True)),
     }
 
@@ -137,7 +132,8 @@ def _tried(
     from glovecal_models.diagnosis.detectability.detection import trial
     from glovecal_models.diagnosis.detectability.injection import where_injected, why_not_injected
 
-    put_in: Effect | None = None if work.effect is None else effect(work.effect)
+    own = {item.name: item for item in session.on.own}
+    put_in: Effect | None = None if work.effect is None else own.get(work.effect) or effect(work.effect)
     where = where_injected(session, put_in, work.rotations)
     why = None if put_in is None else why_not_injected(session, put_in)
     found = []

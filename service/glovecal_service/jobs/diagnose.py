@@ -11,14 +11,11 @@ import numpy as np
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.diagnosis.known_effect import known_effects
-from glovecal_models.effects.catalogue import effect_of_declaration, known_by_name
+from glovecal_models.effects.catalogue import effect_of_declaration
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
@@ -85,7 +82,7 @@ class DiagnoseJob:
 
 def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, Cancelled."""
-    from glovecal_models.diagnosis.diagnose import diagnose  # heavy, and many commands run no job
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes  # heavy, and many commands run no job
 
     model = work.on.model
     report("holding the takes against each other", 0.0)
@@ -94,17 +91,9 @@ def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> T
     report("measuring the noise floors", 0.0)
     floors = floors_of(model, takes)
     own = [effect_of_declaration(item) for item in work.declarations]
-    with known_by_name([*declared_effects(model), *own]):
-        found = diagnose(
-            repaired_takes(takes, requested_effects(model)),
-            model.layout,
-            linear=model.method in LINEAR_METHODS,
-            known=known_effects(model),
-            noise_floors=floors,
-            seed=work.seed,
-            cancelled=cancelled,
-            report=report,
-        )
+    found = ModelOnTakes.of(model, takes, own).diagnosed(
+        noise_floors=floors, seed=work.seed, cancelled=cancelled, report=report
+    )
     facts = [{**asdict(item), "sentence": item.sentence} for item in odd if item.is_set_aside]
     return TaskResult({}, {**DiagnosisView.of(found).document(), "odd_takes": facts})
 

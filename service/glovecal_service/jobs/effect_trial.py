@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
-from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.calibration.model_recipe import effect_named
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.catalogue import effect, effect_of_declaration, known_by_name
+from glovecal_models.effects.catalogue import effect_of_declaration
 from glovecal_models.takes.take import Take
 
 
@@ -38,18 +36,11 @@ class TrialResult(NamedTuple):
 def try_effect(trial: EffectTrial) -> TrialResult:
     """Raises BadInput, NotTrainable."""
     model = load(trial.artifact)
-    asked = effect(trial.effect) if trial.declaration is None else effect_of_declaration(trial.declaration)
-    with known_by_name([*declared_effects(model), asked]):
-        found = diagnose(
-            repaired_takes(trial.takes, requested_effects(model)),
-            model.layout,
-            linear=model.method in LINEAR_METHODS,
-            known=known_effects(model),
-            effects=[asked],
-            signatures=False,
-            judge_residual=False,
-            noise_floors={},
-        )
+    own = [] if trial.declaration is None else [effect_of_declaration(trial.declaration)]
+    asked = own[0] if own else effect_named(model, trial.effect)
+    found = ModelOnTakes.of(model, trial.takes, own).diagnosed(
+        effects=[asked], signatures=False, judge_residual=False, noise_floors={}
+    )
     judged = next((item for item in found.assessments if item.effect == asked.name), None)
     why = next((item.why for item in found.not_identifiable if item.effect == asked.name), None)
     return TrialResult(judged, why)

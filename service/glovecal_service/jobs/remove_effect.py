@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_models.calibration.model_recipe import declared_effects
-from glovecal_models.effects.catalogue import known_by_name
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_models.progress import Report
 from glovecal_service.jobs.child_record import artifact_array, keep_child
@@ -70,15 +68,14 @@ def run(work: RemovalWork, cancelled: Callable[[], bool], report: Report) -> Tas
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     on, model = work.on, work.on.model
     report(f"learning again without {work.effect}", 0.1)
-    with known_by_name(declared_effects(model)):
-        child = remove_effect(
-            model,
-            on.takes,
-            work.effect,
-            settings=on.settings,
-            parent_id=on.id,
-            take_hashes=on.take_hashes,
-            cancelled=cancelled,
-        )
+    child = remove_effect(
+        model,
+        on.takes,
+        work.effect,
+        settings=on.settings,
+        parent_id=on.id,
+        take_hashes=on.take_hashes,
+        cancelled=cancelled,
+    )
     facts = {"after": plain(child.error_estimate.get("rmse_deg"))}
     return TaskResult({"artifact": artifact_array(child)}, facts)

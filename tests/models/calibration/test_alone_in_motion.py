@@ -13,6 +13,7 @@ from glovecal_models.calibration.folds import alone_in_their_motion
 from glovecal_models.calibration.held_out_check import _cut, frame_errors_of, held_out_errors
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -21,7 +22,7 @@ from glovecal_models.takes.take import Take
 
 SENSORS = ("I_PIP", "M_PIP")
 SETTINGS = TrainingSettings(folds=2, samples=150)
-CREEP = [EffectRequest("creep", SENSORS)]
+CREEP = [EffectRequest(effect("creep"), SENSORS)]
 FREE = ("w1-t1", "w1-t2", "w1-t3", "w1-t4")
 
 

@@ -14,6 +14,7 @@ from glovecal_models.calibration.new_weights import with_new_weights
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -37,7 +38,7 @@ def takes() -> PreparedTakes:
 
 def test_what_is_predicted_has_no_bias_in_training(takes: PreparedTakes) -> None:
     settings = TrainingSettings(folds=0, samples=300)
-    fit = fit_with_effects(takes, SENSORS, [EffectRequest("creep", SENSORS)], settings)
+    fit = fit_with_effects(takes, SENSORS, [EffectRequest(effect("creep"), SENSORS)], settings)
     errors = np.concatenate(frame_errors_of(fit, takes, SENSORS, settings))
     rmse = np.sqrt(np.nanmean(errors**2, axis=0))
     assert np.all(np.abs(np.nanmean(errors, axis=0)) < NOISE_SHARE * rmse)
@@ -48,7 +49,7 @@ def test_new_weights_on_the_same_base_are_the_old_ones(takes: PreparedTakes) -> 
     base = fit_with_effects(takes, SENSORS, [], settings)
     columns = {name: correspondence_for(takes, name, settings) for name in SENSORS}
     own = {name: OwnSignal.of(takes, columns[name], base.regressor(name)) for name in SENSORS}
-    wanted = [EffectRequest("creep", SENSORS)]
+    wanted = [EffectRequest(effect("creep"), SENSORS)]
     first = fitted_effects(takes, columns, own, wanted, is_linear=False, is_last=True, cancelled=None)
     again = with_new_weights(first, takes, columns, own, is_linear=False)
     assert first[0].form is not None

@@ -8,6 +8,7 @@ from glovecal_models.calibration.effect_fit import fit_with_effects
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -39,7 +40,7 @@ def test_a_fold_ends_where_a_cold_search_does(takes: PreparedTakes) -> None:
 def test_turns_end_when_one_more_changes_little(
     takes: PreparedTakes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    wanted = [EffectRequest("creep", SENSORS, {})]
+    wanted = [EffectRequest(effect("creep"), SENSORS, {})]
     usual = fit_with_effects(takes, SENSORS, wanted, SETTINGS)
     assert len(usual.optima) <= effect_fit.MOST_TURNS + 2 + effect_fit.MOST_WEIGHT_TURNS
     monkeypatch.setattr(effect_fit, "SETTLED_SHARE", 0.0)

@@ -20,9 +20,10 @@ from glovecal_models.diagnosis.detectability.detection import (
 from glovecal_models.diagnosis.detectability.injection import injected, injected_takes, why_not_injected
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
 from glovecal_models.diagnosis.detectability.text import confusability_sentences, detectability_sentence
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.resampled import SMOOTHING
-from glovecal_models.effects.catalogue import catalogue, declared_effect, effect, known_by_name
+from glovecal_models.effects.catalogue import catalogue, declared_effect, effect
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -36,7 +37,7 @@ PLAN = SessionPlan(seed=7, sensors=SENSORS, wearings=3, takes_per_wearing=3, tak
 
 @pytest.fixture(scope="module")
 def session() -> SurrogateSession:
-    return SurrogateSession.of(record_session(PLAN).takes, LAYOUT)
+    return SurrogateSession.of(ModelOnTakes(record_session(PLAN).takes, LAYOUT))
 
 
 def errors(session: SurrogateSession, takes, smoothing: int = 1) -> list[float]:
@@ -51,18 +52,18 @@ def errors(session: SurrogateSession, takes, smoothing: int = 1) -> list[float]:
 
 def test_without_noise_and_effect_readings_are_perfect(session):
     assert max(errors(session, session.takes({}), SMOOTHING)) < 0.05
-    assert min(errors(session, session.recorded, SMOOTHING)) > 0.25
+    assert min(errors(session, session.on.takes, SMOOTHING)) > 0.25
 
 
 def test_with_its_own_noise_the_session_is_the_recorded_one(session):
     same = session.takes({}, session.residual)
-    for take, recorded in zip(same, session.recorded, strict=True):
+    for take, recorded in zip(same, session.on.takes, strict=True):
         np.testing.assert_allclose(take.readings, recorded.readings, atol=1e-9)
 
 
 def test_noise_of_other_moments_is_as_large(session):
     takes = injected_takes(session, None, np.random.default_rng(3))
-    assert errors(session, takes) == pytest.approx(errors(session, session.recorded), rel=0.1)
+    assert errors(session, takes) == pytest.approx(errors(session, session.on.takes), rel=0.1)
     other = injected_takes(session, None, np.random.default_rng(4))
     assert not np.array_equal(takes[0].readings, other[0].readings)
 
@@ -93,21 +94,18 @@ def test_a_large_effect_is_named_and_nothing_is_not(session):
 def test_an_effect_hidden_in_the_residuals_is_not_carried_along():
     """A hysteresis of 3 degrees in the recording: the trial with nothing put in does not find it."""
     takes = record_session(PLAN, [Cause("hysteresis", strength_deg=3.0)]).takes
-    nothing = trial(SurrogateSession.of(takes, LAYOUT), None, (), 0.0)
+    nothing = trial(SurrogateSession.of(ModelOnTakes(takes, LAYOUT)), None, (), 0.0)
     assert nothing is not None
     assert nothing.named == ()
 
 
 def test_an_effect_of_ones_own_is_put_in_and_found(session):
     own = declared_effect("name = bent_hinge; columns = own * own; unit = deg")
-    with known_by_name([own]):
-        assert why_not_injected(session, own) is None
-        assert injected(session, own, ["I_PIP"], 1.0, np.random.default_rng(0)) is None, (
-            "the static map has it"
-        )
+    assert why_not_injected(session, own) is None
+    assert injected(session, own, ["I_PIP"], 1.0, np.random.default_rng(0)) is None, "the static map has it"
     own = declared_effect("name = ripple; columns = sin(10 * own); unit = deg")
-    with known_by_name([own]):
-        found = trial(session, own, SENSORS, 4.0)
+    with_own = replace(session, on=replace(session.on, own=(own,)))
+    found = trial(with_own, own, SENSORS, 4.0)
     assert found is not None
     assert found.outcome == "named", found.named
 
@@ -123,8 +121,8 @@ def test_what_cannot_be_put_in_says_why(session):
     assert found.sizes == ()
     assert "cannot be tried" in detectability_sentence(found)
     shared = Layout.from_columns("shared", SENSORS, ("BEND", "SPREAD"))
-    renamed = [replace(take, rotations=("BEND", "SPREAD")) for take in session.recorded]
-    without = SurrogateSession.of(renamed, shared)
+    renamed = [replace(take, rotations=("BEND", "SPREAD")) for take in session.on.takes]
+    without = SurrogateSession.of(ModelOnTakes(tuple(renamed), shared))
     assert why_not_injected(without, effect("hysteresis")) == "no rotation has a working sensor of its own"
     assert detectability(without, effect("hysteresis")).sizes == ()
     with pytest.raises(BadInput, match="no take measured 'R_PIP'"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -17,7 +16,7 @@ from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
 from glovecal_models.effects.base.facts import Control, Kind, Settings, Stage
 from glovecal_models.effects.base.history_effect import HistoryEffect
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.catalogue import catalogue, declared_effect, known_by_name, stored_effect
+from glovecal_models.effects.catalogue import catalogue, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
@@ -374,14 +373,6 @@ def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
     assert catalogue()["lag"].transient_s(np.array([[0.05]]), {}) == 1.0
     assert [effect.needs_time for effect in DECLARED] == [False, True, True]
     assert [effect.has_memory for effect in DECLARED] == [False, True, False]
-
-
-def test_an_effect_that_is_known_by_name_is_known_to_its_own_thread_alone() -> None:
-    own = declared_effect("name = strap; columns = own * own; unit = deg")
-    with known_by_name([own]), ThreadPoolExecutor(1) as elsewhere:
-        assert catalogue()["strap"] is own
-        assert "strap" not in elsewhere.submit(catalogue).result()
-    assert "strap" not in catalogue()
 
 
 def test_a_play_is_known_once_the_joint_has_moved_through_it_and_after_a_gap_anew() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.catalogue import declared_effect, known_by_name
+from glovecal_models.effects.catalogue import declared_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
@@ -38,8 +38,7 @@ MODEL = train(TAKES, LAYOUT, "anna", SETTINGS)
 
 def added(columns: str) -> Addition:
     effect = ExpressionEffect.parse(f"name = strap; columns = {columns}")
-    with known_by_name([effect]):
-        return add_effect(MODEL, TAKES, "strap", settings=SETTINGS)
+    return add_effect(MODEL, TAKES, effect, settings=SETTINGS)
 
 
 @pytest.mark.parametrize("factor", ["1e-6", "1e6", "1e8"])

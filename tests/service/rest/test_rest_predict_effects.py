@@ -19,8 +19,8 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
 SHIFT = added("donning_shift", (), (3.0, 0.0), settings={"wearings": ["monday"], **UNITS})
-COLD = added("temperature", (), (4.0, 0.0), settings={"low": 4.0, "high": 5.0, "usual": 5.0, **UNITS})
-REMEMBERS, INSTANT = model_with(HYSTERESIS, CREEP, LAG), model_with(SHIFT, COLD)
+GRIP = added("contact_pressure", (), (4.0, 0.0), settings={"low": 4.0, "high": 5.0, "usual": 5.0, **UNITS})
+REMEMBERS, INSTANT = model_with(HYSTERESIS, CREEP, LAG), model_with(SHIFT, GRIP)
 RANDOM = np.random.default_rng(3)
 READINGS = 120 + np.cumsum(RANDOM.normal(0, 3, (80, 3)), axis=0)
 TIME_S = np.cumsum(RANDOM.uniform(0.005, 0.015, 80))
@@ -73,14 +73,14 @@ def test_effects_without_memory_need_no_times(client: RestClient, keep: Any) -> 
     np.testing.assert_allclose(answer["mean_deg"], base)
     assert answer["sentences"] == [
         "nobody said which wearing this is: donning_shift is not corrected",
-        "context temperature_c is not sent: temperature is not corrected",
+        "context contact_n is not sent: contact_pressure is not corrected",
     ]
     degrees = np.where(np.arange(80) < 40, np.nan, 4.5)
-    answer = client.predict(model, READINGS, context={"temperature_c": degrees}, wearing="monday")
+    answer = client.predict(model, READINGS, context={"contact_n": degrees}, wearing="monday")
     correction = np.array(answer["mean_deg"]) - base
     np.testing.assert_allclose(correction[:, 0], np.where(np.arange(80) < 40, 3.0, 1.0))
     assert answer["sentences"] == []
-    other = client.predict(model, READINGS, context={"temperature_c": degrees}, wearing="friday")
+    other = client.predict(model, READINGS, context={"contact_n": degrees}, wearing="friday")
     assert other["sentences"] == ["wearing 'friday' was not in training: donning_shift is not corrected"]
 
 
@@ -106,11 +106,11 @@ def test_a_model_lists_its_effects(client: RestClient, keep: Any) -> None:
     listed = {row["id"]: row["effects"] for row in client.get("/models")}
     assert [listed[model] for model in models] == [
         ["hysteresis", "creep", "lag"],
-        ["donning_shift", "temperature"],
+        ["donning_shift", "contact_pressure"],
     ]
     creep = client.get(f"/models/{models[0]}")["effect_details"][1]
     assert (creep["effect"], creep["rotations"]) == ("creep", ["I_MCP", "M_MCP"])
     learned = {"fast_tau_s": 0.5, "slow_tau_s": 2.5, "slow_share_deg_per_deg": 0.15}
     assert learned.items() <= creep["parameters"]["I_MCP"].items()
     assert (creep["has_memory"], creep["settling_s"], creep["evidence"]) == (True, 2.5, {})
-    assert client.get(f"/models/{models[1]}")["effect_details"][1]["context"] == ["temperature_c"]
+    assert client.get(f"/models/{models[1]}")["effect_details"][1]["context"] == ["contact_n"]

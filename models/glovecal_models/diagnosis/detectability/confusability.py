@@ -70,10 +70,12 @@ class Confusability:
         return tuple(pair for pair in self.pairs if pair.is_confused)
 
 
-def confusability(problem: DiagnosisProblem, effects: Sequence[Effect] | None = None) -> Confusability:
-    """``effects``: None for the whole catalogue and every recorded context column."""
+def confusability(
+    problem: DiagnosisProblem, effects: Sequence[Effect] | None = None, declared: Sequence[Effect] = ()
+) -> Confusability:
+    """``effects``: None for the whole catalogue, those ``declared`` by a user and every context column."""
     design = problem.design()
-    every = candidates(design.signals) if effects is None else list(effects)
+    every = candidates(design.signals, declared) if effects is None else list(effects)
     has = {name for item in problem.known for name in (item.effect.name, *item.effect.alike)}
     found, why = [], {}
     for item in every:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,6 @@ from glovecal_models.diagnosis.detectability.injection import (
     why_not_injected,
 )
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
-from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.progress import Cancel
@@ -115,11 +114,7 @@ def trial(
     item = None if effect is None else injected(session, effect, rotations, size_deg, drawn)
     if effect is not None and item is None:
         return None
-    found = diagnose(
-        injected_takes(session, item, noise),
-        session.layout,
-        linear=session.linear,
-        known=session.known,
+    found = replace(session.on, takes=injected_takes(session, item, noise)).diagnosed(
         signatures=False,
         judge_residual=False,
         noise_floors={},

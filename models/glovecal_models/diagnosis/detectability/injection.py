@@ -51,7 +51,7 @@ def why_not_injected(session: SurrogateSession, effect: Effect) -> str | None:
     """
     if effect.kind == "nothing":
         return "it is the absence of any effect"
-    has = {name for item in session.known for name in (item.effect.name, *item.effect.alike)}
+    has = {name for item in session.on.known for name in (item.effect.name, *item.effect.alike)}
     if effect.name in has:
         return "the model has it, or an effect like it, already"
     if not effect.has_columns and not is_delay(effect):
@@ -168,7 +168,7 @@ def _delayed(
         low, high = (middle, high) if size(sign * middle) < size_deg else (low, middle)
         if high - low < 1e-4:
             break
-    return Injected({}, [sign * high] * len(session.recorded))
+    return Injected({}, [sign * high] * len(session.on.takes))
 
 
 def injected_takes(

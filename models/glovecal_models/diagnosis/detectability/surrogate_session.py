@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.errors import BadInput
-from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
 AS_RECORDED, EVERY_ROW = 1, 1
@@ -39,10 +38,7 @@ class OwnSensor:
 class SurrogateSession:
     """A fitted session, to make takes of."""
 
-    recorded: tuple[Take, ...]
-    layout: Layout
-    linear: bool
-    known: tuple[KnownEffect, ...]
+    on: ModelOnTakes
     limits: DiagnosisLimits
     problem: DiagnosisProblem
     design: ForwardDesign
@@ -55,26 +51,20 @@ class SurrogateSession:
     @classmethod
     def of(
         cls,
-        takes: Sequence[Take],
-        layout: Layout,
-        *,
-        linear: bool = False,
-        known: Sequence[KnownEffect] = (),
+        on: ModelOnTakes,
         limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
     ) -> SurrogateSession:
         """Raises BadInput when no angle was measured."""
-        if are_pose_labels(takes):
+        if are_pose_labels(on.takes):
             raise BadInput("the reference only names poses (0 or 1): without angles no effect can be put in")
-        problem = DiagnosisProblem.of(takes, layout, linear, known, limits)
+        problem = DiagnosisProblem.of(on.takes, on.layout, on.linear, on.known, limits)
         design = problem.design(AS_RECORDED, EVERY_ROW)
         residual = tuple(np.full(take.own.shape, np.nan) for take in design.signals)
         for joint, products in enumerate(design.products):
             for (take, rows), unit in zip(design.units(joint), products.units, strict=True):
                 residual[take][rows, joint] = unit.target - products.fitted(unit.base)
         sensors = _own_sensors(problem, design)
-        return cls(
-            tuple(takes), layout, linear, tuple(known), limits, problem, design, sensors, residual
-        )  # fmt: skip
+        return cls(on, limits, problem, design, sensors, residual)
 
     @property
     def rotations(self) -> tuple[str, ...]:
@@ -131,7 +121,7 @@ class SurrogateSession:
         ``residual``, None for none at all; ``delays_s``: how late the readings of each take are.
         """
         found = []
-        for number, (take, even) in enumerate(zip(self.recorded, self.problem.even, strict=True)):
+        for number, (take, even) in enumerate(zip(self.on.takes, self.problem.even, strict=True)):
             readings = np.array(take.readings, dtype=float)
             for rotation, sensor in self.sensors.items():
                 joint = self.rotations.index(rotation)
