@@ -115,23 +115,10 @@ def diagnose(
     such as ``"name = strap; columns = c.strap_n * own"``. ``seed`` is of the controls. Raises BadInput,
     Cancelled.
     """
-    from glovecal_models.comparison.noise_floor import rotation_noise
-    from glovecal_models.comparison.odd_takes import fitting, odd_takes
-    from glovecal_models.comparison.residuals import residuals
-    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
+    from glovecal_models.diagnosis.model_on_takes import diagnose_model
 
     inner, takes = inner_model(model), takes_in(takes)
     own = declared(also)
     with library_call(progress) as report:
-        report("holding the takes against each other", 0.0)
-        odd = odd_takes(takes, inner.layout)
-        takes = fitting(takes, odd)
-        report("measuring the noise floors", 0.0)
-        noise = rotation_noise(residuals(inner, takes))
-        found = ModelOnTakes.of(inner, takes, own).diagnosed(
-            noise_floors={n: item.floor for n, item in noise.items() if item.floor is not None},
-            seed=seed,
-            cancelled=cancelled,
-            report=report,
-        )
-    return Diagnosis(found, tuple(item.told for item in odd if item.is_set_aside))
+        found = diagnose_model(inner, takes, own=own, seed=seed, cancelled=cancelled, report=report)
+    return Diagnosis(found.diagnosis, tuple(item.told for item in found.odd if item.is_set_aside))

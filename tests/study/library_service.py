@@ -7,17 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import repaired_takes, requested_effects
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
-from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.known_effect import known_effects
+from glovecal_models.diagnosis.model_on_takes import diagnose_model
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
-from glovecal_service.jobs.diagnose import floors_of
 from glovecal_service.views.addition import AdditionView
 from glovecal_service.views.comparison import comparison_view
 from glovecal_service.views.diagnosis import DiagnosisView
@@ -82,10 +79,7 @@ class LibraryService:
 
     def _diagnosed(self, name: str) -> dict[str, Any]:
         model = self._models[name]
-        takes = repaired_takes(self._taught, requested_effects(model))
-        floors = floors_of(model, self._taught)
-        found = diagnose(takes, model.layout, known=known_effects(model), noise_floors=floors)
-        return DiagnosisView.of(found).document()
+        return DiagnosisView.of(diagnose_model(model, self._taught).diagnosis).document()
 
     def _added(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
         settings = self._settings[name]

@@ -9,11 +9,15 @@ from typing import Any
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
 from glovecal_models.calibration.training_settings import LINEAR_METHODS
+from glovecal_models.comparison.noise_floor import rotation_noise
+from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
+from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import KnownEffect, known_effects
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.layout import Layout
+from glovecal_models.progress import Cancel, Report
 from glovecal_models.takes.take import Take
 
 
@@ -60,3 +64,41 @@ class ModelOnTakes:
         return diagnose(
             self.takes, self.layout, linear=self.linear, known=self.known, own=self.own, **choices
         )
+
+
+@dataclass(frozen=True)
+class DiagnosedModel:
+    """What is missing in a model, and which of the takes did not fit the others."""
+
+    diagnosis: Diagnosis
+    odd: tuple[OddTake, ...]
+    """Those that are set aside were not diagnosed."""
+
+
+def diagnose_model(
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    *,
+    own: Sequence[Effect] = (),
+    seed: int = 0,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
+) -> DiagnosedModel:
+    """Hold the takes against each other, measure their noise floors, and diagnose those that fit.
+
+    ``own``: effects that a user declared beside the model's; ``seed`` of the controls. Raises BadInput,
+    Cancelled.
+    """
+    say = report or (lambda sentence, share: None)
+    say("holding the takes against each other", 0.0)
+    odd = odd_takes(takes, model.layout)
+    takes = fitting(takes, odd)
+    say("measuring the noise floors", 0.0)
+    noise = rotation_noise(residuals(model, takes))
+    found = ModelOnTakes.of(model, takes, own).diagnosed(
+        noise_floors={name: item.floor for name, item in noise.items() if item.floor is not None},
+        seed=seed,
+        cancelled=cancelled,
+        report=report,
+    )
+    return DiagnosedModel(found, tuple(odd))

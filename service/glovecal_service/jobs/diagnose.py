@@ -10,10 +10,6 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.noise_floor import rotation_noise
-from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.effects.catalogue import effect_of_declaration
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -82,20 +78,14 @@ class DiagnoseJob:
 
 def run(work: DiagnosisWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
     """In a worker. Raises BadInput, Cancelled."""
-    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes  # heavy, and many commands run no job
+    from glovecal_models.diagnosis.model_on_takes import diagnose_model  # heavy, and many commands run no job
 
-    model = work.on.model
-    report("holding the takes against each other", 0.0)
-    odd = odd_takes(work.on.takes, model.layout)
-    takes = fitting(work.on.takes, odd)
-    report("measuring the noise floors", 0.0)
-    floors = floors_of(model, takes)
     own = [effect_of_declaration(item) for item in work.declarations]
-    found = ModelOnTakes.of(model, takes, own).diagnosed(
-        noise_floors=floors, seed=work.seed, cancelled=cancelled, report=report
+    found = diagnose_model(
+        work.on.model, work.on.takes, own=own, seed=work.seed, cancelled=cancelled, report=report
     )
-    facts = [{**asdict(item), "sentence": item.sentence} for item in odd if item.is_set_aside]
-    return TaskResult({}, {**DiagnosisView.of(found).document(), "odd_takes": facts})
+    facts = [{**asdict(item), "sentence": item.sentence} for item in found.odd if item.is_set_aside]
+    return TaskResult({}, {**DiagnosisView.of(found.diagnosis).document(), "odd_takes": facts})
 
 
 def _odd_take(
@@ -125,9 +115,3 @@ def _model_that_fits(store: Store, own: ModelRecord, take: Take, most_deg: float
         if error <= most_deg and (best is None or error < best[0]):
             best = error, f"{active.subject}'s model {active.id[:12]} fits it: {error:.1f} degrees."
     return None if best is None else best[1]
-
-
-def floors_of(model: CalibrationModel, takes: Sequence[Take]) -> dict[str, NoiseFloor]:
-    """How small errors can get on these takes, for each rotation of which that is known."""
-    noise = rotation_noise(residuals(model, takes))
-    return {name: item.floor for name, item in noise.items() if item.floor is not None}
