@@ -307,7 +307,7 @@ def real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -
 
 def recorder(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:
     """The recorder process."""
-    from glovecal_service.realtime.recorder_process import run_recorder
+    from glovecal_service.recorder.process import run_recorder
 
     run_recorder(settings, stopped, started)
 

@@ -129,3 +129,18 @@ def test_nothing_is_known_by_what_stands_around_it() -> None:
     for folder in SOURCES.values():
         for path in sorted(folder.rglob("*.py")):
             assert "contextvars" not in path.read_text(encoding="utf-8"), path
+
+
+APART = (
+    ("realtime", "recorder"),
+    ("recorder", "realtime"),
+    ("incoming", "realtime"),
+    ("incoming", "recorder"),
+)
+
+
+@pytest.mark.parametrize(("folder", "other"), APART)
+def test_the_folder_of_a_process_imports_no_other_process(folder: str, other: str) -> None:
+    """Real time and the recorder share what lets frames in, and nothing else of each other."""
+    for path in sorted((SOURCES["service"] / folder).rglob("*.py")):
+        assert f"glovecal_service.{other}" not in path.read_text(encoding="utf-8"), path

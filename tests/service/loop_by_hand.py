@@ -14,7 +14,7 @@ from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
-from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.corrected_frames import corrected
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.pose_loop import PoseLoop

@@ -16,7 +16,7 @@ from glovecal_client import Frame, FrameLog, encode_frame
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
-from glovecal_service.realtime.recorder import Recorder
+from glovecal_service.recorder.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 

@@ -15,8 +15,8 @@ from glovecal_client.session import open_router
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState
-from glovecal_service.realtime.live_sampling import LiveSampling
-from glovecal_service.realtime.sampling_runner import SamplingRunner
+from glovecal_service.recorder.live_sampling import LiveSampling
+from glovecal_service.recorder.sampling_runner import SamplingRunner
 from glovecal_service.store import Store
 
 ENDED = Event()

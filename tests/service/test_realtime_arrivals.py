@@ -11,7 +11,7 @@ from realtime_support import eventually, free_endpoint
 
 from glovecal_client.keys import all_gloves
 from glovecal_client.session import open_client, open_router
-from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.arrivals import Arrival, Arrivals
 
 RAW = all_gloves("lab", "raw")
 

@@ -16,7 +16,7 @@ from realtime_support import linear_model
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
 from glovecal_service.realtime.glove_lanes import VALID_WITHIN_NS, GloveLanes
 from glovecal_service.realtime.pace import Pace

@@ -22,11 +22,11 @@ from glovecal_client.capture.log_queries import LogQueries
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
 from glovecal_client.gap_repair import split_frames
 from glovecal_client.keys import GloveKeys
-from glovecal_service.realtime import reconciliation
-from glovecal_service.realtime.capture_log import CaptureRun, CaptureStanding
-from glovecal_service.realtime.reconciliation import Patience, reconcile
-from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.run_ledger import BEGIN, RunLedger
+from glovecal_service.recorder import reconciliation
+from glovecal_service.recorder.capture_log import CaptureRun, CaptureStanding
+from glovecal_service.recorder.reconciliation import Patience, reconcile
+from glovecal_service.recorder.recording_account import Settlement
+from glovecal_service.recorder.run_ledger import BEGIN, RunLedger
 
 MS = 1_000_000
 CLOCK_AHEAD_NS = 3_600_000 * MS

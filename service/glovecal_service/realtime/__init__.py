@@ -1,1 +1,1 @@
-"""The real-time half of the service: router, prediction, recorder. It never waits for the other half."""
+"""The real-time process: router and prediction. It waits for no other."""

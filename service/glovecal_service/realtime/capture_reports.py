@@ -13,8 +13,8 @@ from glovecal_client.errors import BadName
 from glovecal_client.keys import all_gloves, parse_glove_key
 from glovecal_client.plausible_loss import PlausibleLoss
 from glovecal_client.queries import json_object
-from glovecal_service.realtime.arrivals import Arrival, Arrivals
-from glovecal_service.realtime.frame_gate import Place, Standing
+from glovecal_service.incoming.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.frame_gate import Place, Standing
 from glovecal_service.realtime.glove_lanes import GLOVES_LIMIT
 
 SETTLED_AFTER_NS = 500_000_000

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
-from glovecal_service.realtime.frame_gate import FrameGate, Standing
+from glovecal_service.incoming.frame_gate import FrameGate, Standing
+from glovecal_service.incoming.refusal import RefusalCount, Refused
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.live_watch import LiveWatch
-from glovecal_service.realtime.refusal import RefusalCount, Refused
 from glovecal_service.realtime.served_model import ServedModel
 
 WAITING_LIMIT = 64

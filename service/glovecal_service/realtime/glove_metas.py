@@ -11,7 +11,7 @@ import zenoh
 from glovecal_client.errors import BadName, NoAnswer
 from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
 from glovecal_client.queries import ask, json_object
-from glovecal_service.realtime.arrivals import Arrivals
+from glovecal_service.incoming.arrivals import Arrivals
 from glovecal_service.realtime.glove_lane import GloveLane
 
 ASK_EVERY_S = 2.0

@@ -29,11 +29,11 @@ from glovecal_client.wire.pose import (
 )
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_models.calibration.servable import LARGEST_DEG
-from glovecal_service.realtime.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.arrivals import Arrival, Arrivals
+from glovecal_service.incoming.refusal import Refusal, Refused
 from glovecal_service.realtime.corrected_frames import corrected
 from glovecal_service.realtime.glove_lane import GloveLane
 from glovecal_service.realtime.glove_lanes import GloveLanes
-from glovecal_service.realtime.refusal import Refusal, Refused
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGloves
 

@@ -14,9 +14,9 @@ import zenoh
 from glovecal_client.keys import all_gloves, service_alive_key
 from glovecal_client.session import open_router
 from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_service.incoming.arrivals import Arrivals
 from glovecal_service.operating_system import go_first
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.arrivals import Arrivals
 from glovecal_service.realtime.glove_metas import GloveMetas
 from glovecal_service.realtime.live_explanations import LiveExplanations
 from glovecal_service.realtime.model_watcher import ModelWatcher

@@ -14,8 +14,8 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.servable import check_servable
 from glovecal_models.calibration.wearer_fit import WearerFit
+from glovecal_service.incoming.refusal import Refusal, Refused
 from glovecal_service.realtime.pace import Pace
-from glovecal_service.realtime.refusal import Refusal, Refused
 
 BESIDES_PREDICTION_S = 200e-6
 """First guess of what a frame costs beside its prediction: decoding, checking, encoding, publishing."""

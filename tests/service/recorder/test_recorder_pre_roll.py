@@ -22,7 +22,7 @@ from recorder_support import (
 from glovecal_client import DamagedLog, Recording
 from glovecal_client.session import open_router
 from glovecal_models.errors import BadInput
-from glovecal_service.realtime import pre_roll, run_ledger
+from glovecal_service.recorder import pre_roll, run_ledger
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store

@@ -24,7 +24,7 @@ from recorder_support import GLOVE, capturing, logged, recording_thread
 from glovecal_client import Recording
 from glovecal_client.capture.device import Reading
 from glovecal_client.session import open_client, open_router
-from glovecal_service.realtime.recorder import Recorder
+from glovecal_service.recorder.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.recordings import STOP_ASKED

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from glovecal_client.errors import WireError
 from glovecal_client.wire.frame import Frame, decode_frame
-from glovecal_service.realtime.refusal import Refusal, Refused
-from glovecal_service.realtime.sequence_order import SequenceOrder
+from glovecal_service.incoming.refusal import Refusal, Refused
+from glovecal_service.incoming.sequence_order import SequenceOrder
 
 TAKEOVER_AFTER_NS = 500_000_000
 """A publisher keeps its glove until it was silent this long; then another run may take it over."""

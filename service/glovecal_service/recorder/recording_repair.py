@@ -6,10 +6,10 @@ from pathlib import Path
 from threading import Event
 
 from glovecal_client.errors import NoAnswer
-from glovecal_service.realtime.capture_log import CaptureLog
-from glovecal_service.realtime.reconciliation import Patience, reconcile
-from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.run_ledger import RunLedger
+from glovecal_service.recorder.capture_log import CaptureLog
+from glovecal_service.recorder.reconciliation import Patience, reconcile
+from glovecal_service.recorder.recording_account import Settlement
+from glovecal_service.recorder.run_ledger import RunLedger
 
 REPAIR_WITHIN_S = 60.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from glovecal_service.realtime.pre_roll_request import PreRollRequest
-from glovecal_service.realtime.reconciliation import Outcome
-from glovecal_service.realtime.run_ledger import CAPTURE, RunLedger
+from glovecal_service.recorder.pre_roll_request import PreRollRequest
+from glovecal_service.recorder.reconciliation import Outcome
+from glovecal_service.recorder.run_ledger import CAPTURE, RunLedger
 from glovecal_service.store.recordings import PRE_ROLL
 
 

@@ -16,8 +16,8 @@ from glovecal_models.errors import GlovecalError
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.touch_watch import TouchWatch
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.live_sampling import LiveSampling
-from glovecal_service.realtime.sampling_takes import keep_sampled_takes
+from glovecal_service.recorder.live_sampling import LiveSampling
+from glovecal_service.recorder.sampling_takes import keep_sampled_takes
 from glovecal_service.settings import Settings
 from glovecal_service.store.errors import DamagedRows, StorageFull, StoreError, StoreUnavailable
 from glovecal_service.store.records import SamplingRecord

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from glovecal_client.plausible_loss import PlausibleLoss
 from glovecal_client.wire.frame import Frame
-from glovecal_service.realtime.refusal import Refusal, Refused
+from glovecal_service.incoming.refusal import Refusal, Refused
 
 CONFIRMED_AFTER_NS = 400_000_000
 CONFIRMED_BY_FRAMES = 3

@@ -16,8 +16,8 @@ import zenoh
 from glovecal_client.errors import NoAnswer, QueryRefused, WireError
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.capture_log import CaptureStanding
-from glovecal_service.realtime.run_ledger import RunBooks, RunLedger
+from glovecal_service.recorder.capture_log import CaptureStanding
+from glovecal_service.recorder.run_ledger import RunBooks, RunLedger
 
 END_OF_RUN = (1 << 63) - 1
 TRY_AGAIN_AFTER_S = 0.1

@@ -15,7 +15,7 @@ from typing import Any
 
 from glovecal_client.plausible_loss import BURST_FRAMES, PlausibleLoss
 from glovecal_client.wire.frame import Frame
-from glovecal_service.realtime.sequence_ranges import SequenceRanges
+from glovecal_service.recorder.sequence_ranges import SequenceRanges
 
 OWN_CLOCK = "own_clock"
 

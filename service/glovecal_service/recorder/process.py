@@ -8,8 +8,8 @@ from threading import Event, Thread
 from glovecal_client.errors import NoAnswer
 from glovecal_client.session import open_client
 from glovecal_models.threads import pin_blas_to_one_thread
-from glovecal_service.realtime.recorder import Recorder
-from glovecal_service.realtime.sampling_runner import SamplingRunner
+from glovecal_service.recorder.recorder import Recorder
+from glovecal_service.recorder.sampling_runner import SamplingRunner
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 

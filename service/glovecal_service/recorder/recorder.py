@@ -20,14 +20,14 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.queries import ask_json
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.capture_log import CaptureLog
-from glovecal_service.realtime.live_recording import LiveRecording
-from glovecal_service.realtime.pre_roll_request import pre_roll_request
-from glovecal_service.realtime.reconciliation import Patience
-from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.recording_repair import repair, settle
-from glovecal_service.realtime.recording_result import keep_as_take
-from glovecal_service.realtime.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
+from glovecal_service.recorder.capture_log import CaptureLog
+from glovecal_service.recorder.live_recording import LiveRecording
+from glovecal_service.recorder.pre_roll_request import pre_roll_request
+from glovecal_service.recorder.reconciliation import Patience
+from glovecal_service.recorder.recording_account import Settlement
+from glovecal_service.recorder.recording_repair import repair, settle
+from glovecal_service.recorder.recording_result import keep_as_take
+from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
 from glovecal_service.settings import Settings
 from glovecal_service.store.clock import now
 from glovecal_service.store.errors import (

@@ -13,7 +13,7 @@ from glovecal_client.log_records import Recording
 from glovecal_client.wire.frame import Frame
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
-from glovecal_service.realtime.run_ledger import CAPTURE
+from glovecal_service.recorder.run_ledger import CAPTURE
 
 
 @dataclass(frozen=True)

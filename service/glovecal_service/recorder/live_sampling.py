@@ -16,9 +16,9 @@ from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.state import OVER, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
-from glovecal_service.realtime.arrivals import Arrivals
-from glovecal_service.realtime.background_planner import BackgroundPlanner
-from glovecal_service.realtime.run_ledger import decoded
+from glovecal_service.incoming.arrivals import Arrivals
+from glovecal_service.recorder.background_planner import BackgroundPlanner
+from glovecal_service.recorder.run_ledger import decoded
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import RecordingRecord, SamplingRecord
 from glovecal_service.store.store import Store

@@ -9,10 +9,10 @@ from typing import Any
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.handedness import Handedness, known_hand
-from glovecal_service.realtime.recording_account import Settlement
-from glovecal_service.realtime.recording_take import read_take
-from glovecal_service.realtime.run_books import OWN_CLOCK
-from glovecal_service.realtime.run_ledger import CAPTURE, SUFFIX
+from glovecal_service.recorder.recording_account import Settlement
+from glovecal_service.recorder.recording_take import read_take
+from glovecal_service.recorder.run_books import OWN_CLOCK
+from glovecal_service.recorder.run_ledger import CAPTURE, SUFFIX
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY
 from glovecal_service.store.records import RecordingRecord, TakeRecord
