@@ -12,7 +12,7 @@ PACKAGES = ("models/glovecal_models", "models/glovecal", "client/glovecal_client
 MODELS = "glovecal_models"
 PLUG_INS = ("glovecal_models.effects.", "glovecal_models.simulation.causes.")
 MACHINERY = "glovecal_models.effects.base."
-MOST_SINGLE = 46
+MOST_SINGLE = 39
 
 
 def modules() -> dict[str, Path]:

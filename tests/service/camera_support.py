@@ -36,8 +36,7 @@ from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_service.camera import tracking_setup as setup_module
 from glovecal_service.camera.camera_settings import CameraSettings, TrackingSettings
 from glovecal_service.camera.camera_tracking import CameraSummary, CameraTracking
-from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
-from glovecal_service.camera.tracking_setup import ASSUMED, glove_colours
+from glovecal_service.camera.tracking_setup import ASSUMED, RATE_HZ, RenderedGlove, glove_colours
 
 SMALL: dict[str, Any] = {"entries": 300, "clips": 3}
 

@@ -43,7 +43,7 @@ from glovecal_models.errors import BadInput
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.newest_picture import NewestPicture, NumberedPicture
 from glovecal_service.camera.picture_reader import MissingPictures
-from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
+from glovecal_service.camera.tracking_setup import RATE_HZ, RenderedGlove
 
 PICTURE = np.full((480, 640, 3), 180, np.uint8)
 """Of a wall."""

@@ -24,7 +24,7 @@ from glovecal_client.wire.frame import encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import BadInput
 from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS
-from glovecal_service.recorder.recording_take import read_take
+from glovecal_service.recorder.recording_result import read_take
 from glovecal_service.recorder.run_ledger import RunLedger
 
 SETTLING_S = 2.5

@@ -19,9 +19,8 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
 from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
 from glovecal_service.realtime.glove_lanes import VALID_WITHIN_NS, GloveLanes
-from glovecal_service.realtime.pace import Pace
 from glovecal_service.realtime.pose_loop import PoseLoop
-from glovecal_service.realtime.served_model import ServedModel, ServedModels
+from glovecal_service.realtime.served_model import Pace, ServedModel, ServedModels
 from glovecal_service.realtime.worn_gloves import WornGloves
 
 MILLISECOND = 1_000_000

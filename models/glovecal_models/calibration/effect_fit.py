@@ -9,19 +9,20 @@ moves the regressors themselves, and needs more. Then forms are learned, and wei
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.added_effect import AddedEffect, form_values
 from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.fit_memory import KNOWN_FITS
-from glovecal_models.calibration.fit_task import FitResult
-from glovecal_models.calibration.fitted_effects import fitted_effects
+from glovecal_models.calibration.fit_task import FitResult, FitTask, run_task
+from glovecal_models.calibration.fitted_effects import fitted_effects, with_curves
+from glovecal_models.calibration.joint_rows import base_rows, joint_weights, signals_of_lanes
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
-from glovecal_models.calibration.new_weights import with_new_weights
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.samples import Samples, joined_variances, sampled_rows
@@ -219,3 +220,96 @@ def _explained(
                 sums = total.setdefault(name, [np.zeros(len(item.time_s)) for item in takes.takes])
                 sums[number] += part[:, lane]
     return total
+
+
+# Fits that this process did before: folds, turns and trials of several effects ask for the same ones.
+#
+# Whatever effect is tried, the first turn trains the regressors of every fold without it; the same samples
+# with the same settings are the same task, by its key.
+
+
+MOST_BYTES = 64_000_000
+"""Of arrays; the longest unused are forgotten first."""
+
+
+class FitMemory:
+    """Safe to use from several threads; two that ask for the same fit at once may both do it."""
+
+    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+        self._most, self._bytes, self._lock = most_bytes, 0, Lock()
+        self._fits: OrderedDict[str, FitResult] = OrderedDict()
+
+    def fit(self, task: FitTask, *, cancelled: Cancel | None = None) -> FitResult:
+        """As ``run_task``, whose results are never changed. Raises NotTrainable, Cancelled."""
+        with self._lock:
+            if task.key in self._fits:
+                self._fits.move_to_end(task.key)
+                return self._fits[task.key]
+        result = run_task(task, cancelled=cancelled)
+        with self._lock:
+            if task.key not in self._fits:
+                self._fits[task.key] = result
+                self._bytes += _size(result)
+            while self._bytes > self._most:
+                self._bytes -= _size(self._fits.popitem(last=False)[1])
+        return result
+
+
+def _size(result: FitResult) -> int:
+    return sum(array.nbytes for array in result.arrays.values())
+
+
+KNOWN_FITS = FitMemory()
+
+
+# New weights of effects whose shapes and forms are known, on a base that has moved since.
+
+
+def with_new_weights(
+    effects: Sequence[AddedEffect],
+    takes: PreparedTakes,
+    columns: Mapping[str, Correspondence],
+    own: Mapping[str, OwnSignal],
+    *,
+    is_linear: bool,
+) -> tuple[AddedEffect, ...]:
+    """``effects`` on the rotations of ``own``, all weights of a joint fitted together.
+
+    ``columns``: for each rotation what it is read from. ``is_linear``: the base is a straight line.
+    """
+    rows = {name: takes.rows(name) for name in own}
+    signals = [signals_of_lanes(takes, each.effect, each.rotations, columns, own) for each in effects]
+    extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in own}
+    priors: dict[str, list[np.ndarray]] = {name: [] for name in own}
+    every = [added.columns_of_takes(part) for added, part in zip(effects, signals, strict=True)]
+    for added, found in zip(effects, every, strict=True):
+        prior = added.effect.prior_sd(added.settings)
+        prior = np.concatenate([prior, np.ones(added.weights.shape[1] - len(prior))])
+        for lane, name in enumerate(added.rotations):
+            extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
+            priors[name].append(prior)
+    bases = {name: base_rows(takes, columns[name], rows[name], is_linear) for name in own}
+    weights = {name: iter(joint_weights(bases[name], extra[name], priors[name])) for name in own}
+    result = []
+    for added, of_takes, found in zip(effects, signals, every, strict=True):
+        mine = {name: next(weights[name]) for name in added.rotations}
+        degrees = {name: [part @ item.mean for part in extra[name].pop(0)] for name, item in mine.items()}
+        settings = added.settings
+        if added.form is not None:
+            values = [
+                form_values(added.effect, take, part[:, :, : added.own_count], settings)
+                for take, part in zip(of_takes, found, strict=True)
+            ]
+            settings = with_curves(settings, added.effect.form_unit, values, rows, degrees)
+        result.append(
+            replace(
+                added,
+                settings=settings,
+                weights=np.array([item.mean for item in mine.values()]),
+                zero_deg=np.array([own[name].zero_deg for name in added.rotations]),
+                covariance=None
+                if added.covariance is None
+                else np.array([item.covariance for item in mine.values()]),
+            )
+        )
+    return tuple(result)

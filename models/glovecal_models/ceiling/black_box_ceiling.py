@@ -8,12 +8,15 @@ model nor the box has seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.effect_fit import optima_of
+from glovecal_models.calibration.effect_fit import Optima, fit_with_effects, optima_of
+from glovecal_models.calibration.effect_request import EffectRequest
+from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.held_out_check import frame_errors_of
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.model_recipe import (
     declared_effects,
@@ -26,15 +29,18 @@ from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.ceiling.black_box import left_by_box
 from glovecal_models.ceiling.ceiling import Ceiling, Gain, is_gain, verdict_of
-from glovecal_models.ceiling.held_out_take_errors import held_out_take_errors
 from glovecal_models.ceiling.limits import CEILING_LIMITS, CeilingLimits
 from glovecal_models.ceiling.recorded_columns import (
     GROUPS,
+    MOST_ROWS,
+    ROW_EVERY,
     TakeColumns,
     exchange_order,
+    exchanged,
+    own_averages,
     recorded_columns,
+    smoothed_error,
 )
-from glovecal_models.ceiling.rotation_rows import RotationRows, joined, products_of
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.progress import Cancel, Report, part, stop_if
@@ -225,3 +231,104 @@ def _own_sensors(prepared: PreparedTakes, rotation: str) -> tuple[int, ...]:
     measuring = item.measuring_sensor
     names = item.sensors[:MOST_OWN_SENSORS] if measuring is None else (measuring,)
     return tuple(prepared.layout.sensors.index(name) for name in names)
+
+
+# The errors of a model's recipe on whole takes that its fit never saw, frame by frame.
+
+
+FOLDS = 4
+
+
+def held_out_take_errors(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[EffectRequest],
+    settings: TrainingSettings,
+    *,
+    optima: Optima = (),
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
+) -> list[np.ndarray]:
+    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured.
+
+    ``optima`` as in ``fit_with_effects``. Raises NotTrainable, Cancelled.
+    """
+    found = [np.empty((0, 0))] * len(takes.takes)
+    folds = folds_over_takes(np.arange(len(takes.takes)), FOLDS)
+    for number, fold in enumerate(folds):
+        if report:
+            report(f"leaving out {fold.sentence}", number / len(folds))
+        held = np.flatnonzero(fold.held_out).tolist()
+        kept = takes.some(np.flatnonzero(~fold.held_out).tolist())
+        fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
+        for at, errors in zip(held, frame_errors_of(fit, takes.some(held), rotations, settings), strict=True):
+            found[at] = errors
+    return found
+
+
+# What the black box is asked of one rotation: rows of recorded columns, and the errors beside them.
+
+
+@dataclass(frozen=True)
+class RotationRows:
+    """Of one rotation, all takes after one another; only rows where it was measured."""
+
+    groups: dict[str, np.ndarray]
+    others: dict[str, np.ndarray]
+    """The same columns with the rows of other takes."""
+    symmetric: np.ndarray
+    target: np.ndarray
+    take: np.ndarray
+    mean_square: float
+    """Of the error at the frames, not smoothed."""
+    own: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls, columns: Sequence[TakeColumns], prepared: PreparedTakes, errors: Sequence[np.ndarray],
+        order: Sequence[int], own: tuple[int, ...],
+    ) -> RotationRows | None:  # fmt: skip
+        smooth = [
+            smoothed_error(item.time_s, take, error)
+            for item, take, error in zip(columns, prepared.takes, errors, strict=True)
+        ]
+        measured = sum(int(np.isfinite(values).sum()) for values in smooth)
+        step = max(ROW_EVERY, -(-measured // MOST_ROWS))
+        index = [np.flatnonzero(np.isfinite(values))[::step] for values in smooth]
+        if min(len(rows) for rows in index) == 0:
+            return None
+        swapped = {name: exchanged([item.groups[name] for item in columns], order) for name in GROUPS}
+
+        def stacked(parts: Sequence[np.ndarray]) -> np.ndarray:
+            return np.concatenate([values[rows] for values, rows in zip(parts, index, strict=True)])
+
+        every = np.concatenate(errors)
+        return cls(
+            {name: stacked([item.groups[name] for item in columns]) for name in GROUPS},
+            {name: stacked(swapped[name]) for name in GROUPS},
+            stacked([item.symmetric_history for item in columns]),
+            stacked(smooth),
+            np.concatenate([np.full(len(rows), number) for number, rows in enumerate(index)]),
+            float(np.nanmean(every**2)),
+            own,
+        )
+
+
+def products_of(rows: RotationRows) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
+    """Places of columns to be multiplied: powers of the own readings, which know no past; and these with the
+    products of a reading and its running averages, a memory that depends on the bend."""
+    sensors = rows.groups["readings"].shape[1]
+    averages = own_averages(rows.own, sensors)
+    powers = [(sensor,) * power for sensor in rows.own for power in (2, 3)]
+    remembered = [
+        (*(sensor,) * power, sensors + place)
+        for sensor, places in averages.items()
+        for place in places
+        for power in (1, 2)
+    ]
+    return powers, [*powers, *remembered]
+
+
+def joined(groups: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Side by side, readings first."""
+    return np.column_stack(list(groups.values()))

@@ -30,13 +30,11 @@ from functools import cached_property
 
 import numpy as np
 
-from glovecal_models.comparison.additive_fit import additive_fit
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
 from glovecal_models.comparison.floor_doubts import clock_doubts, hold_doubts, slow_sampling
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled, stated_floor
 from glovecal_models.comparison.holds import Hold, from_repeated_poses, holds
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
-from glovecal_models.comparison.near_readings import from_near_readings
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.takes.take import Take
 
@@ -259,3 +257,117 @@ def is_at_floor(
 def reaches_floor(rmse_deg: float, high_deg: float, limits: ComparisonLimits = COMPARISON_LIMITS) -> bool:
     """``high_deg``: the upper end of the floor's 95 % interval."""
     return rmse_deg <= limits.at_floor_times * high_deg
+
+
+# A plain map from the readings to the angles, the same whatever model is looked at.
+#
+# A noise floor belongs to the measurements. Taken from a model's residuals it would follow the model: one
+# that
+# has learned its takes by heart would have a floor of zero. So it is taken from what an additive model
+# leaves:
+# a cubic of every sensor, and a constant for each wearing (Hastie and Tibshirani 1990).
+
+
+CUBIC = 3
+ROWS_PER_CURVE = 50
+"""Neighbouring rows are alike; with fewer a straight line of every sensor has to do."""
+RIDGE = 1e-6
+
+
+def additive_fit(takes: Sequence[Take], reference: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """For each take (N, R), degrees; ``reference``: (N, R) at the frames, NaN where not measured.
+
+    Sensors that all takes have and that move are read. A rotation that was never measured is 0.
+    """
+    shared = [name for name in takes[0].sensors if all(name in take.sensors for take in takes)]
+    readings = [take.readings[:, [take.sensors.index(name) for name in shared]] for take in takes]
+    every = np.concatenate(readings)
+    target = np.concatenate(reference)
+    moving = np.ptp(every, axis=0) > 0 if len(every) else np.zeros(len(shared), dtype=bool)
+    low, span = every[:, moving].min(axis=0), np.ptp(every[:, moving], axis=0)
+    rows = int(np.isfinite(target).sum(axis=0).max(initial=0))
+    degree = CUBIC if rows >= ROWS_PER_CURVE * CUBIC * int(moving.sum()) else 1
+    wearings = list(dict.fromkeys(take.wearing for take in takes))
+    columns = [
+        np.column_stack([
+            *(np.full(len(take.time_s), float(take.wearing == name)) for name in wearings),
+            _curves(2.0 * (part[:, moving] - low) / span - 1.0, degree),
+        ])
+        for take, part in zip(takes, readings, strict=True)
+    ]  # fmt: skip
+    weights, centre = _fitted(np.concatenate(columns), target)
+    return [centre + part @ weights for part in columns]
+
+
+def _curves(scaled: np.ndarray, degree: int) -> np.ndarray:
+    """Legendre polynomials without the constant, (N, S * degree); ``scaled``: (N, S), -1 to 1."""
+    powers = np.polynomial.legendre.legvander(scaled, degree)[..., 1:]
+    return powers.reshape(len(scaled), scaled.shape[1] * degree)
+
+
+def _fitted(design: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P, R) and (R,): least squares, with a ridge that only holds what nothing else does; all 0 for a
+    rotation that was never measured. What was measured in the same rows is fitted together."""
+    weights, centre = np.zeros((design.shape[1], target.shape[1])), np.zeros(target.shape[1])
+    alike: dict[bytes, list[int]] = {}
+    for column, known in enumerate(np.isfinite(target).T):
+        if known.any():
+            alike.setdefault(known.tobytes(), []).append(column)
+    for together in alike.values():
+        known = np.isfinite(target[:, together[0]])
+        some, angles = (design, target) if known.all() else (design[known], target[known])
+        centre[together] = angles[:, together].mean(axis=0)
+        gram = some.T @ some + RIDGE * len(some) * np.eye(some.shape[1])
+        weights[:, together] = np.linalg.solve(gram, some.T @ (angles[:, together] - centre[together]))
+    return weights, centre
+
+
+# The noise floor of a table of single poses: frames with nearly the same readings, paired.
+#
+# Rough, and from above: what the readings still differ by is included.
+
+
+MOST_FRAMES = 1500
+
+
+def from_near_readings(
+    takes: Sequence[TakeResiduals],
+    column: int,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> NoiseFloor | None:
+    """From pairs of frames of any take; None with fewer than ``fewest_pairs``."""
+    error = np.concatenate([item.error[:, column] for item in takes])
+    predicted = np.concatenate([item.predicted[:, column] for item in takes])
+    names = takes[0].take.sensors
+    if any(set(item.take.sensors) != set(names) for item in takes):
+        return None
+    readings = np.concatenate(
+        [item.take.readings[:, [item.take.sensors.index(name) for name in names]] for item in takes]
+    )
+    rows = np.flatnonzero(np.isfinite(error))
+    if len(rows) > MOST_FRAMES:
+        rows = np.sort(generator.choice(rows, MOST_FRAMES, replace=False))
+    first, second = _nearest_pairs(readings[rows])
+    if len(first) < limits.fewest_pairs:
+        return None
+    first, second = rows[first], rows[second]
+    jitter = float(np.sqrt(np.mean((predicted[first] - predicted[second]) ** 2) / 2))
+    squares = (error[first] - error[second]) ** 2 / 2
+    return pooled(squares, np.ones(len(squares)), jitter, "near readings", generator)
+
+
+def _nearest_pairs(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both members of each pair: a frame and the one nearest to it, where that is nearer than for most."""
+    spread = readings.std(axis=0) if len(readings) else np.zeros(0)
+    scaled = readings[:, spread > 0] / spread[spread > 0]
+    if len(scaled) < 2 or not scaled.shape[1]:
+        return np.empty(0, dtype=int), np.empty(0, dtype=int)
+    squares = np.sum(scaled**2, axis=1)
+    distance = squares[:, None] + squares[None] - 2 * scaled @ scaled.T
+    np.fill_diagonal(distance, np.inf)
+    nearest = distance.argmin(axis=1)
+    closest = distance[np.arange(len(scaled)), nearest]
+    chosen = np.flatnonzero(closest <= np.median(closest))
+    pairs = np.unique(np.sort(np.column_stack([chosen, nearest[chosen]]), axis=1), axis=0)
+    return pairs[:, 0], pairs[:, 1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import zenoh
@@ -14,10 +15,9 @@ from glovecal_models.layout import Layout
 from glovecal_models.sampling.active.next_step import NextStep
 from glovecal_models.sampling.engine import Sampling
 from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import OVER, SamplingState
+from glovecal_models.sampling.state import OVER, Choose, NextSteps, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_service.incoming.arrivals import Arrivals
-from glovecal_service.recorder.background_planner import BackgroundPlanner
 from glovecal_service.recorder.run_ledger import decoded
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import RecordingRecord, SamplingRecord
@@ -145,3 +145,32 @@ def _reading(frame: Frame) -> GloveReading:
     return GloveReading(
         frame.monotonic_ns / 1e9, frame.sequence, f"{frame.run_id:016x}", frame.readings, frame.button
     )
+
+
+# Choosing the next step in a thread of its own: frames do not wait for it.
+
+
+class BackgroundPlanner:
+    """A ``Choose`` that answers None until ``choose`` has an answer for the state as it is."""
+
+    def __init__(self, choose: Choose) -> None:
+        self._choose = choose
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="next-step")
+        self._asked: tuple[Any, ...] | None = None
+        self._answer: Future[NextSteps | None] | None = None
+
+    def __call__(self, state: SamplingState) -> NextSteps | None:
+        """Raises what ``choose`` raises."""
+        asked = _mark(state)
+        if self._answer is None or asked != self._asked:
+            copy = SamplingState.from_document(state.to_document())
+            self._asked, self._answer = asked, self._worker.submit(self._choose, copy)
+        return self._answer.result() if self._answer.done() else None
+
+    def close(self) -> None:
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+
+def _mark(state: SamplingState) -> tuple[Any, ...]:
+    """Differs when the answer may."""
+    return (len(state.protocol.steps), *((each.step, each.counts) for each in state.attempts))

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from glovecal_client.log_records import Recording
+from glovecal_client.wire.frame import Frame
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.handedness import Handedness, known_hand
+from glovecal_models.takes.take import Take
 from glovecal_service.recorder.recording_account import Settlement
-from glovecal_service.recorder.recording_take import read_take
 from glovecal_service.recorder.run_books import OWN_CLOCK
 from glovecal_service.recorder.run_ledger import CAPTURE, SUFFIX
 from glovecal_service.store.errors import NotFound
@@ -112,3 +117,125 @@ def _sentence(record: RecordingRecord, settlement: Settlement) -> str:
     told += [f"the capture log cannot tell of all: {why}"] if why else []
     told += [record.facts[ENDED_BY]] if ENDED_BY in record.facts else []
     return "; ".join(told)
+
+
+# A finished recording file as a take.
+
+
+@dataclass(frozen=True)
+class RecordedTake:
+    """The take, and what has to be known about its time and its glove."""
+
+    take: Take
+    clock: dict[str, Any]
+    """``wall_minus_time_s``: add it to ``time_s`` for seconds since 1970; ``begins_s``: ``time_s`` of the
+    first frame that was asked for, after the pre-roll; ``left_out``: frames not taken; ``computer``: whose
+    monotonic clock ``time_s`` is of, and ``hand``: of the glove, null where capture did not say."""
+
+
+def read_take(
+    path: Path, *, name: str, wearing: str, first_sequence: int = 0, capture: Mapping[str, Any] | None = None
+) -> RecordedTake:
+    """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
+
+    Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll. ``capture``: what
+    it said of itself, where the file's header does not have it.
+    Frames whose time does not increase, or with another number of sensors, are left out and counted.
+    Raises BadInput if nothing usable remains, DamagedLog, OSError.
+    """
+    recording = Recording.open(path)
+    frames = _in_order(list(recording.frames()))
+    meta = recording.meta.get(CAPTURE) or capture or {}
+    sensors = tuple(str(sensor) for sensor in meta.get("sensors") or ())
+    if not sensors:
+        raise BadInput(f"recording {path.name}: capture did not say which sensors its frames hold")
+    usable = [frame for frame in frames if len(frame.readings) == len(sensors)]
+    if not usable:
+        raise BadInput(f"recording {path.name}: none of its {len(frames)} frames has {len(sensors)} sensors")
+    time_s = _time_s(usable)
+    kept = _increasing(time_s)
+    taken = [frame for frame, keep in zip(usable, kept, strict=True) if keep]
+    lead = sum(
+        frame.repaired and frame.run_id == taken[0].run_id and frame.sequence < first_sequence
+        for frame in taken
+    )
+    if lead == len(taken):
+        raise BadInput(f"recording {path.name}: none of the frames asked for has {len(sensors)} sensors")
+    begins_s = float(time_s[kept][lead])
+    take = Take(
+        name=name,
+        wearing=wearing,
+        sensors=sensors,
+        time_s=time_s[kept],
+        readings=np.array([frame.readings for frame in taken], dtype=np.float64),
+        context=_context(taken, [str(item) for item in meta.get("context") or ()]),
+        simulated=any(frame.simulated for frame in taken),
+        begins_s=begins_s if lead else None,
+    )
+    offset = taken[lead].wall_ns / 1e9 - begins_s
+    clock: dict[str, Any] = {
+        "wall_minus_time_s": offset,
+        "begins_s": begins_s,
+        "left_out": len(frames) - len(taken),
+    }
+    clock["computer"] = meta.get("computer")
+    clock["hand"] = meta.get("hand")
+    return RecordedTake(take, clock)
+
+
+def _in_order(frames: Sequence[Frame]) -> list[Frame]:
+    """By run, in the order the runs began, and by sequence number: repaired frames were written late.
+
+    Where a publisher's numbers went on from a lower one, by time. The run met first is the first.
+    """
+    began_ns: dict[int, int] = {}
+    for frame in frames:
+        began_ns[frame.run_id] = min(frame.wall_ns, began_ns.get(frame.run_id, frame.wall_ns))
+    first, *others = began_ns
+    order = {run: place for place, run in enumerate([first, *sorted(others, key=lambda run: began_ns[run])])}
+    restarted = _restarted(frames)
+
+    def place(frame: Frame) -> tuple[int, int]:
+        return order[frame.run_id], frame.monotonic_ns if frame.run_id in restarted else frame.sequence
+
+    return sorted(frames, key=place)
+
+
+def _restarted(frames: Sequence[Frame]) -> set[int]:
+    """Runs with frames that were recorded as they came, and are later than ones with higher numbers."""
+    newest: dict[int, Frame] = {}
+    found = set()
+    for frame in frames:
+        if frame.repaired:
+            continue
+        before = newest.get(frame.run_id, frame)
+        if frame.sequence < before.sequence and frame.monotonic_ns > before.monotonic_ns:
+            found.add(frame.run_id)
+        newest[frame.run_id] = frame
+    return found
+
+
+def _time_s(frames: Sequence[Frame]) -> np.ndarray:
+    """Monotonic seconds; a run after a restart of the computer is put in place by the wall clock."""
+    time_s = np.array([frame.monotonic_ns for frame in frames]) / 1e9
+    for at in range(1, len(frames)):
+        before, after = frames[at - 1], frames[at]
+        if after.run_id != before.run_id and time_s[at] <= time_s[at - 1]:
+            step = max(1e-3, (after.wall_ns - before.wall_ns) / 1e9)
+            time_s[at:] += time_s[at - 1] + step - time_s[at]
+    return time_s
+
+
+def _increasing(time_s: np.ndarray) -> np.ndarray:
+    """Where the time is later than at every kept frame before."""
+    latest = np.maximum.accumulate(time_s)
+    return np.concatenate([[True], time_s[1:] > latest[:-1]])
+
+
+def _context(frames: Sequence[Frame], names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Columns of the frames that carry all context values; columns never measured are dropped."""
+    rows = [
+        frame.context if len(frame.context) == len(names) else np.full(len(names), np.nan) for frame in frames
+    ]
+    values = np.array(rows, dtype=np.float64).reshape(len(frames), len(names))
+    return {name: values[:, at] for at, name in enumerate(names) if np.isfinite(values[:, at]).any()}

@@ -19,12 +19,12 @@ from fastapi import FastAPI, WebSocket
 from nicegui import app as pages
 from nicegui import ui
 from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketDisconnect
 
 from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
 from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
-from glovecal_service.studio.page_policy import PagePolicy
 from glovecal_service.studio.pages import cameras, capture, compare, diagnose, effects, fall, live, models
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.studio import Studio
@@ -106,3 +106,34 @@ async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
             await socket.send_bytes(feed.array(pose))
             shown = pose
         await asyncio.sleep(FRAME_S)
+
+
+# What a page of the studio may do in the browser: ask its own service only, and stand in nobody's frame.
+#
+# The library writes its pages with inline scripts and compiles templates, so both are allowed; nothing
+# typed by
+# a user reaches a page as markup.
+
+
+POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; font-src 'self' data:; object-src 'none'; "
+    "base-uri 'self'; form-action 'self'; frame-ancestors 'none'"
+)
+"""Of a page in another site's frame, clicks could be stolen."""
+
+
+class PagePolicy:
+    """ASGI middleware: the Content-Security-Policy of every answer."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def with_policy(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                policy = (b"content-security-policy", POLICY.encode())
+                message = {**message, "headers": [*message.get("headers", []), policy]}
+            await send(message)
+
+        await self.app(scope, receive, with_policy)

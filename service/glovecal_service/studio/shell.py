@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from typing import Any
+from urllib.parse import quote
 
 from nicegui import ui
 
 from glovecal_service.studio.heading import heading
-from glovecal_service.studio.jobs_drawer import JobsDrawer
+from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
 NAVIGATION = (
@@ -50,3 +52,93 @@ def shell(studio: Studio, here: str, title: str) -> Iterator[None]:
         heading(1, title)
         yield
     drawer.start()
+
+
+# Jobs on every page: what runs and how far it is, cancel, result; what finished meanwhile is announced.
+
+
+EVERY_S = 1.0
+SHOWN = 12
+WITH_REPORTS = ("improve", "detectability")
+PAGES = {"diagnose": ("diagnose?model=", "What it found"), "ceiling": ("compare?models=", "Compare")}
+"""Where a job's model is shown with its result; of other kinds its errors are."""
+
+
+def result_link(job: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Name and address of the page that shows what a finished job found; None where there is none."""
+    result = job["result"]
+    if not result:
+        return None
+    if job["kind"] in WITH_REPORTS:
+        return "Report", f"../v1/jobs/{job['id']}/report"
+    model = result.get("model")
+    if not model:
+        return None
+    page, name = PAGES.get(job["kind"], ("fall?model=", "Its errors"))
+    return name, f"/{page}{quote(str(model))}"
+
+
+class JobsDrawer:
+    """A button in the header with the number of running jobs, and the list behind it."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._running: dict[str, tuple[str, float, str]] | None = None
+        self._button = (
+            ui.button("Jobs", on_click=lambda: self._dialog.open())
+            .props('flat no-caps aria-haspopup="dialog"')
+            .classes("studio-target")
+        )
+        with (
+            ui.dialog().props('position="right" aria-label="Jobs"') as self._dialog,
+            ui.card().classes("jobs"),
+        ):
+            heading(2, "Jobs")
+            self._list = ui.column().classes("jobs-list")
+            ui.button("Close", on_click=self._dialog.close).props("flat no-caps").classes("studio-target")
+
+    def start(self) -> None:
+        ui.timer(EVERY_S, self._look)
+
+    async def _look(self) -> None:
+        service = self._studio.service
+        try:
+            running = await service.get("/jobs", only_unfinished=True)
+            now = {job["id"]: (job["state"], job["fraction"], job["sentence"]) for job in running}
+            if now == self._running:
+                return
+            jobs = (await service.get("/jobs"))[:SHOWN]
+        except Refusal:
+            return
+        self._button.set_text(f"Jobs ({len(now)} running)" if now else "Jobs")
+        for job in jobs:
+            if self._running is not None and job["id"] in self._running and job["id"] not in now:
+                ui.notify(f"{job['kind']}: {job['state']}", position="bottom-right")
+        self._running = now
+        self._list.clear()
+        with self._list:
+            for job in jobs:
+                self._row(job)
+            if not jobs:
+                ui.label("No job yet.")
+
+    def _row(self, job: dict[str, Any]) -> None:
+        with ui.element("section").classes("job"):
+            ui.label(f"{job['kind']}: {job['state']}").classes("job-kind")
+            if job["finished_at"] is None:
+                share = job["fraction"]
+                ui.linear_progress(share, show_value=False).props(f'aria-label="{job["kind"]}"')
+                ui.button("Cancel", on_click=lambda: self._cancel(job["id"])).props("flat no-caps").classes(
+                    "studio-target"
+                )
+            ui.label(job["sentence"]).classes("job-sentence")
+            found = result_link(job)
+            if found is not None:
+                name, address = found
+                ui.link(name, address).classes("studio-link")
+
+    async def _cancel(self, job: str) -> None:
+        try:
+            await self._studio.service.post(f"/jobs/{job}/cancel")
+        except Refusal as refusal:
+            ui.notify(str(refusal), type="warning")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.calibration.fit_memory import FitMemory
+from glovecal_models.calibration.effect_fit import FitMemory
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.model import restore_regressor
 from glovecal_models.calibration.training_settings import TrainingSettings

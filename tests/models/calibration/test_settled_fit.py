@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from further_forms import every_form
 
-from glovecal_models.calibration.effect_fit import NOISE_SHARE, correspondence_for, fit_with_effects
+from glovecal_models.calibration.effect_fit import (
+    NOISE_SHARE,
+    correspondence_for,
+    fit_with_effects,
+    with_new_weights,
+)
 from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.fitted_effects import fitted_effects
 from glovecal_models.calibration.held_out_check import frame_errors_of
-from glovecal_models.calibration.new_weights import with_new_weights
 from glovecal_models.calibration.own_signal import OwnSignal
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings

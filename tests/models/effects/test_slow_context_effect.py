@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.followed_column import (
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.slow_context_effect import (
     FOLLOWS_S,
     ColumnStart,
     FollowedColumn,
     mean_slopes,
 )
-from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import catalogue
 
 TIME = np.arange(0, 60, 0.04)

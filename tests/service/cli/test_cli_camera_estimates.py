@@ -34,8 +34,7 @@ from glovecal_models.errors import Cancelled
 from glovecal_models.takes.camera_reference.estimates import read_estimates
 from glovecal_service.camera.camera_settings import TrackingSettings
 from glovecal_service.camera.recorded_estimates import Recordings, matched
-from glovecal_service.camera.rendered_glove import RATE_HZ, RenderedGlove
-from glovecal_service.camera.tracking_setup import ASSUMED, tracking_setup
+from glovecal_service.camera.tracking_setup import ASSUMED, RATE_HZ, RenderedGlove, tracking_setup
 
 PERIOD_NS = round(1e9 / RATE_HZ)
 

@@ -10,7 +10,7 @@ from cli_running import glovecal
 from effect_models import CREEP, HYSTERESIS, UNITS, added, model_with
 
 from glovecal_models.calibration.artifact import dump
-from glovecal_service.cli.model.rows import effect_rows
+from glovecal_service.cli.model.models import effect_rows
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 

@@ -18,8 +18,8 @@ from glovecal_client.session import open_client, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag
 from glovecal_service.settings import Settings
 from glovecal_service.studio.glove_state import SENTENCES, Word, glove_state
-from glovecal_service.studio.jobs_drawer import result_link
 from glovecal_service.studio.live_feed import LiveFeeds
+from glovecal_service.studio.shell import result_link
 
 STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
 POSE = Pose(7, 1, 0, 0, model_sha256="ab" * 32, degrees=np.zeros(2, np.float32), skipped=3, age_us=1500)

@@ -7,6 +7,8 @@ over the past minutes (``followed_column``); inside a take the second part is of
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -15,8 +17,8 @@ from glovecal_models.effects.base.column_steps import step_columns, step_names, 
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.base.effect import Stream
 from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.followed_column import ColumnStart, FollowedColumn, mean_slopes
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
+from glovecal_models.effects.base.relaxation import relax
 from glovecal_models.effects.base.signals import Signals
 
 STEEPEST_SHARE = 99.0
@@ -105,3 +107,146 @@ class _SlowContextStream(Stream):
 
     def reset(self) -> None:
         self._state = None
+
+
+# How far a sensor that follows a context column within minutes is behind it, frame by frame.
+#
+# To first order it feels f' = (h - f) / T and starts a take at h - T h', as a steady rise before would have
+# left it. Takes are too short to tell T; (h - f) / T, the mean slope of the past minutes, hardly depends on
+# it.
+# The slope at the first frame decides, for the column's noise times T is an error. It is estimated
+# anew with each frame, by Bayesian regression on a parabola through all frames since the start; until they
+# tell
+# anything it is the slope with which training takes usually begin.
+
+
+FOLLOWS_S = 150.0
+"""Cloth takes one to several minutes."""
+START_LASTS_S = 60.0
+"""Frames so long after the start tell how it began; a parabola holds no longer."""
+FIRST_FRAME_S = 0.01
+"""The first frame's value is as certain as the mean of so long a time."""
+LEAST_START_FRAMES, LEAST_S, BLOCK_S = 20, 2.0, 1.0
+EXPECTED_STEADY_TAKES = 2.0
+"""Takes without any slope that are counted beside those of training: the mean of few is held near zero."""
+LEAST = 1e-12
+MOST_KEPT = 64
+"""Takes whose slopes are remembered."""
+
+
+@dataclass(frozen=True)
+class ColumnStart:
+    """How takes begin, in units of the column and seconds: what is expected of the next one."""
+
+    noise: float
+    """Spectral density: the variance of a mean over one second."""
+    slope: float
+    slope_sd: float
+    curvature_sd: float
+
+    @classmethod
+    def of_takes(cls, takes: Sequence[tuple[np.ndarray, np.ndarray]]) -> ColumnStart:
+        """``takes``: times and values (N,) of the column, NaN where unknown."""
+        noises, slopes, curvatures = [], [], []
+        for time_s, value in takes:
+            for part in unbroken(time_s):
+                found = _start(time_s[part], value[part])
+                if found is not None:
+                    noises.append(found[0])
+                    slopes.append(found[1])
+                    curvatures.append(found[2])
+        if not slopes:
+            return cls(1.0, 0.0, LEAST, LEAST)
+        slope = float(np.sum(slopes)) / (len(slopes) + EXPECTED_STEADY_TAKES)
+        spread = float(np.sqrt(np.mean((np.array(slopes) - slope) ** 2)))
+        curved = float(np.sqrt(np.mean(np.square(curvatures))))
+        return cls(max(float(np.mean(noises)), LEAST), slope, max(spread, LEAST), max(curved, LEAST))
+
+    def to_settings(self) -> dict[str, float]:
+        return asdict(self)
+
+
+def _start(time_s: np.ndarray, value: np.ndarray) -> tuple[float, float, float] | None:
+    """Noise, slope and curvature of one take's start, by a cubic; None where it is too short."""
+    if not len(time_s):
+        return None
+    known = np.isfinite(value) & (time_s - time_s[0] <= START_LASTS_S)
+    time, height = time_s[known], value[known]
+    if len(time) < LEAST_START_FRAMES or time[-1] - time[0] < LEAST_S:
+        return None
+    time = time - time[0]
+    end = time[-1]
+    powers = np.vander(time / end, 4, increasing=True)
+    found = np.linalg.lstsq(powers, height - height[0], rcond=None)[0]
+    left = height - height[0] - powers @ found
+    block = np.unique((time / BLOCK_S).astype(int), return_index=True)[1]
+    counts = np.diff([*block.tolist(), len(time)])
+    sums = np.add.reduceat(left, block)
+    # The square of a sum over its count is the variance of one frame, or more where neighbours are alike.
+    frame = float(np.sum(sums**2 / counts)) / len(block)
+    return frame * end / len(time), float(found[1]) / end, 2.0 * float(found[2]) / end**2
+
+
+class FollowedColumn:
+    """State of one glove. Unknown values (NaN) tell nothing: the last known one is held."""
+
+    def __init__(self, start: ColumnStart) -> None:
+        self._start = start
+        self._precision = np.diag(
+            [FIRST_FRAME_S / start.noise, 1.0 / start.slope_sd**2, 1.0 / start.curvature_sd**2]
+        )
+        self._sums = np.zeros((3, 4))
+        """Of squares and products of the parabola's terms, and of these with the column."""
+        self._origin = np.nan
+        self._passed_s = 0.0
+        self._height = 0.0
+        self._followed = np.zeros(1)
+
+    def run(self, elapsed_s: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """(B,): mean slope per second after each of B frames, ``elapsed_s`` (B,) after one another."""
+        result = np.full(len(value), self._start.slope)
+        known = np.isfinite(value)
+        first = 0
+        if not np.isfinite(self._origin):
+            if not known.any():
+                return result
+            first = int(known.argmax())
+            self._origin = float(value[first])
+            elapsed_s = elapsed_s.copy()
+            elapsed_s[first] = 0.0
+        result[first:] = self._run(elapsed_s[first:], value[first:], known[first:])
+        return result
+
+    def _run(self, elapsed_s: np.ndarray, value: np.ndarray, known: np.ndarray) -> np.ndarray:
+        passed = np.cumsum(np.concatenate([[self._passed_s], elapsed_s]))[1:]
+        held = np.maximum.accumulate(np.where(known, np.arange(len(value)), -1))
+        height = np.where(held < 0, self._height, value[np.maximum(held, 0)] - self._origin)
+        followed = relax(self._followed, elapsed_s, height[:, None], np.array([FOLLOWS_S]))[:, 0]
+        weight = np.where(known & (passed <= START_LASTS_S), elapsed_s, 0.0) / self._start.noise
+        terms = np.column_stack([np.ones(len(passed)), passed, passed**2 / 2])
+        products = terms[:, :, None] * np.column_stack([terms, height])[:, None, :] * weight[:, None, None]
+        sums = np.cumsum(np.concatenate([self._sums[None], products]), axis=0)[1:]
+        right = sums[:, :, 3] + self._precision @ np.array([0.0, self._start.slope, 0.0])
+        begin = np.linalg.solve(sums[:, :, :3] + self._precision, right[:, :, None])[:, :, 0]
+        self._sums, self._passed_s, self._height = sums[-1], float(passed[-1]), float(height[-1])
+        behind = height - followed - np.exp(-passed / FOLLOWS_S) * (begin[:, 0] - FOLLOWS_S * begin[:, 1])
+        return behind / FOLLOWS_S
+
+
+def mean_slopes(time_s: np.ndarray, value: np.ndarray, start: ColumnStart) -> np.ndarray:
+    """(N,) per second, not to be changed; a gap in the frames begins anew."""
+    times, values = (np.asarray(part, dtype=float).tobytes() for part in (time_s, value))
+    return _mean_slopes(times, values, start)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _mean_slopes(times: bytes, values: bytes, start: ColumnStart) -> np.ndarray:
+    """Of a take's column as bytes: all joints of a glove, one after the other, ask for the same."""
+    time_s, value = np.frombuffer(times), np.frombuffer(values)
+    elapsed = elapsed_s(time_s)
+    result = np.zeros(len(time_s))
+    for part in unbroken(time_s):
+        if part.stop > part.start:
+            result[part] = FollowedColumn(start).run(elapsed[part], value[part])
+    result.flags.writeable = False
+    return result
