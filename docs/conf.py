@@ -45,6 +45,7 @@ html_show_copyright = False
 html_use_index = False
 
 STUDY = ["The blind study <docs/study>"] if (HERE / "study.md").exists() else []
+TRIED = "What was tried <docs/study-tried>"
 """``python3 do.py study --page docs/study.md`` writes that page once the study has run."""
 
 NAVIGATION = {
@@ -74,7 +75,7 @@ NAVIGATION = {
         "docs/thresholds",
         "Messages on the wire <client/glovecal_client/wire/README>",
     ],
-    "Project": ["As measured <docs/measured>", *STUDY, "ARCHITECTURE", "CHANGELOG"],
+    "Project": ["As measured <docs/measured>", *STUDY, TRIED, "ARCHITECTURE", "CHANGELOG"],
 }
 
 
