@@ -36,7 +36,7 @@ class SubjectRecord:
     """Hand dimensions in millimetres by name; empty if nobody measured them."""
     created_at: datetime
     hand: str = "unknown"
-    """The one that is calibrated: ``right``, ``left``, or ``unknown`` until somebody says it."""
+    """For what does not say its own: ``right``, ``left``, or ``unknown`` until somebody says it."""
 
     @property
     def known_hand(self) -> Handedness | None:

@@ -71,6 +71,7 @@ def test_both_hands_are_recorded_filmed_and_joined(
     assert "R_index" in markers
     assert "L_index" in markers
     assert [row["name"] for row in run("subject", "list", "--json").json] == ["anna"], "nobody added her"
+    assert "hand           right and left" in run("subject", "show", "anna").out
     hands = {row["id"]: row["known_hand"] for row in run("take", "list", "--json").json}
     assert {id: hands[id] for id in (right, left)} == {right: "right", left: "left"}
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.handedness import HANDS, Handedness
 from glovecal_models.hand.skeleton import Palm
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
@@ -157,16 +157,23 @@ def show(name: Name, as_json: AsJson = False) -> None:
         {
             "subject": name,
             "name": document["title"] or None,
-            "hand": document["hand"],
+            "hand": " and ".join(_hands(document, takes)) or "unknown",
             "measured (mm)": document["dimensions"],
             "added": moment(document["created_at"]),
             "takes": len(takes),
             "models": len(models),
             "active": [
-                f"{row['id'][:12]} ({row['method']}, {row['layout']})" for row in models if row["active"]
+                f"{row['id'][:12]} ({', '.join(filter(None, (row['method'], row['layout'], row['hand'])))})"
+                for row in models
+                if row["active"]
             ],
         }
     )
+
+
+def _hands(subject: dict[str, Any], takes: list[dict[str, Any]]) -> list[str]:
+    """Those that the subject is said to have, and those whose gloves recorded its takes."""
+    return [hand for hand in HANDS if hand in (subject["hand"], *(row["known_hand"] for row in takes))]
 
 
 @app.command("remove")

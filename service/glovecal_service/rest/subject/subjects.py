@@ -55,7 +55,7 @@ class Subject(BaseModel):
     name: str
     title: str
     dimensions: dict[str, float] = Field(description="Measured hand dimensions in millimetres.")
-    hand: str = Field(description="right, left, or unknown.")
+    hand: str = Field(description="right, left, or unknown: for what does not say its hand itself.")
     created_at: datetime
 
 
