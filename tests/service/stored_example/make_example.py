@@ -69,7 +69,7 @@ def _walk(folder: Path, table: Path) -> dict[str, Any]:
     line = run("train", "--subject", "anna", "--method", "linear", "--no-activate")["model"]["id"]
     squeeze = "columns = I_PIP, I_PIP * own; unit = deg"
     run("add-effect", line, "squeeze", "--rotation", "I_MCP", "--expression", squeeze)
-    run("improve", "--subject", "anna", "--method", "linear")
+    run("improve", "--subject", "anna", "--method", "linear", "--no-ceiling")
     run("diagnose", active)
     models = {row["id"]: {name: row[name] for name in ("effects", "active")} for row in run("model", "list")}
     return {
