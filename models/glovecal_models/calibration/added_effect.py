@@ -50,7 +50,7 @@ class AddedEffect:
     zero_deg: np.ndarray
     """(L,): the base's prediction at a raw reading of zero, by a straight line."""
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    """What it saved, beside its decoy, when it was added; plain JSON-able data."""
+    """What it saved, beside its control, when it was added; plain JSON-able data."""
     covariance: np.ndarray | None = None
     """(L, C, C) of the weights; None in models that were stored without."""
 

@@ -26,7 +26,7 @@ DECLARED = [
     ),
     ExpressionEffect.parse(
         "name = glue; columns = lowpass(own_deg, tau) - own_deg, tanh(I_PIP) * own - previous(own);"
-        "parameter tau s 0.1 5 = 1; control = reversed in time"
+        "parameter tau s 0.1 5 = 1; control = time-reversed"
     ),
     ExpressionEffect.parse(
         "name = two-shapes; columns = exp(-t / rate) * abs(own_deg) ^ power;"

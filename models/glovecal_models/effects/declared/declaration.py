@@ -25,13 +25,6 @@ RESERVED: tuple[str, ...] = ("own", "own_deg", "t")
 """The joint's signal in its standard deviations and in degrees, and the seconds since the take began."""
 _UNIT = re.compile(r"[A-Za-z0-9/%^_-]{1,20}\Z")
 _KEYS = ("name", "columns", "unit", "parameters", "ranges", "control", "explanation")
-_OLD_KEY = "decoy"
-_OLD_CONTROLS = {
-    "reversed in time": "time-reversed",
-    "rolled in time": "circularly shifted",
-    "dealt wearings": "permuted wearings",
-}
-"""The key and its values before they were renamed: stored declarations have them."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +72,6 @@ class Declaration:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Declaration:
         """Inverse of ``to_document``; also what REST is sent. Raises BadInput."""
-        if "control" not in document:
-            document = {"control" if key == _OLD_KEY else key: value for key, value in document.items()}
         unknown = [key for key in document if key not in _KEYS]
         if unknown:
             raise BadInput(f"effect: unknown part {unknown[0]!r}; {did_you_mean(unknown[0], _KEYS)}")
@@ -142,7 +133,6 @@ def _read_part(part: str, document: dict[str, Any]) -> None:
         document.setdefault("ranges", {})[words[1][2:]] = words[2:4]
     else:
         key, equals, value = (piece.strip() for piece in part.partition("="))
-        key = "control" if key == _OLD_KEY else key
         if not equals or key not in ("name", "columns", "unit", "control", "explanation"):
             raise BadInput(
                 f"cannot read {part!r}; write name = ..., columns = ..., unit = ..., control = ..., "
@@ -220,7 +210,6 @@ def _unit(value: Any, source: str) -> str:
 
 def _control(document: Mapping[str, Any], source: str) -> Control:
     value = document.get("control", "circularly shifted")
-    value = _OLD_CONTROLS.get(value, value) if isinstance(value, str) else value
     for known in get_args(Control):
         if value == known and known != "none":
             return known
