@@ -196,7 +196,7 @@ class Trial:
         """What the previous version stored is read and used by this one."""
         commit = self.given.previous or _before_newest_migration()
         if not commit:
-            self.table.row("upgrade", "not tried: this clone does not have the history")
+            self.table.row("upgrade", "not tried: no earlier schema, or no history of it in this clone")
             return
         archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
         with tempfile.TemporaryDirectory(dir=self.folder) as context:

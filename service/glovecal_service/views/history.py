@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from glovecal_models.hand.handedness import Handedness, is_of_hand
 from glovecal_models.quick_check.text import DUE
 from glovecal_service.plain import plain
 from glovecal_service.store.records import ModelRecord
@@ -17,6 +18,7 @@ class HistoryRowView(BaseModel):
     made_at: datetime
     model: str
     layout: str
+    hand: Handedness | None = Field(description="Whose glove; null: its takes do not say.")
     kind: Literal["calibration", "quick check"]
     wearing: str | None = Field(description="Of a quick check.")
     as_found_deg: float | None = Field(
@@ -30,15 +32,22 @@ class HistoryRowView(BaseModel):
 class HistoryView(BaseModel):
     subject: str
     rows: list[HistoryRowView] = Field(description="Oldest first.")
-    is_full_calibration_due: bool = Field(description="By the last quick check after the last calibration.")
+    is_full_calibration_due: bool = Field(
+        description="By the last quick check after the last calibration, of either hand."
+    )
     sentences: list[str]
 
 
 def history_view(subject: str, records: Sequence[ModelRecord]) -> HistoryView:
     """``records``: the subject's models, oldest first."""
     rows = [_row(record) for record in records]
-    last = records[-1].facts.get("quick_check", {}) if records else {}
-    is_due = bool(last.get("is_full_calibration_due"))
+    hands: set[Handedness | None] = {record.hand for record in records if record.hand} or {None}
+    newest = [next((each for each in records[::-1] if is_of_hand(each.hand, hand)), None) for hand in hands]
+    is_due = any(
+        each.facts.get("quick_check", {}).get("is_full_calibration_due")
+        for each in newest
+        if each is not None
+    )
     checks = [row for row in rows if row["as_found_deg"] is not None]
     sentences = []
     if checks:
@@ -60,6 +69,7 @@ def _row(record: ModelRecord) -> dict[str, Any]:
             "made_at": record.created_at,
             "model": record.id,
             "layout": record.layout,
+            "hand": record.hand,
             "kind": "calibration" if check is None else "quick check",
             **of_check,
             **{name: record.facts.get(name) if check is None else None for name in names},

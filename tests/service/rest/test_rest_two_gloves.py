@@ -127,3 +127,22 @@ def test_where_nobody_said_the_hand_one_model_reads_both(
     assert [row["id"] for row in client.get("/models") if row["active"]] == [right]
     client.post(f"/models/{table}/activate")
     assert {served(settings, hand)[0] for hand in HANDS} == {table}
+
+
+def test_a_calibration_that_is_due_for_one_hand_is_told_whatever_the_other_did_since(
+    client: RestClient, settings: Settings, takes: dict[str, list[str]]
+) -> None:
+    models = {hand: trained(client, hand) for hand in HANDS}
+    assert not client.get("/subjects/anna/history")["is_full_calibration_due"]
+    due = {"quick_check": {"is_full_calibration_due": True}}
+    with Store.open(settings) as store:
+        for content, hand, facts in ((b"left, checked", "left", due), (b"right, checked", "right", {})):
+            store.models.add(
+                content, subject="anna", layout=LAYOUT.name, method="linear", parent=models[hand], facts=facts
+            )
+    found = client.get("/subjects/anna/history")
+    assert [row["hand"] for row in found["rows"]] == ["right", "left", "left", "right"]
+    assert found["is_full_calibration_due"]
+    job = client.post("/models/train", {"subject": "anna", "method": "raw", "hand": "left"})
+    client.wait_for_job(job["id"], patience_s=300)
+    assert not client.get("/subjects/anna/history")["is_full_calibration_due"]
