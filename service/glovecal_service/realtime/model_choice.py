@@ -71,7 +71,7 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
         return replace(serving, sentence=why)
     newest = max(fitting, key=lambda item: item.activation)
     chain = _chain(store, newest.record, [item.id for item in models if is_of_hand(item.hand, hand)])
-    found = _first_that_loads(store, chain, newest.record.layout, serving, sent, prepared)
+    found = _first_that_loads(store, chain, newest.record, serving, sent, prepared)
     return replace(
         found,
         sentence="; ".join(filter(None, [_other_hand(store, newest.record, glove, hand), found.sentence])),
@@ -174,7 +174,7 @@ def _why_none(
 def _first_that_loads(
     store: Store,
     chain: list[str],
-    layout: str,
+    active: ModelRecord,
     serving: Serving,
     sent: tuple[str, ...] | None,
     prepared: Prepared,
@@ -186,7 +186,7 @@ def _first_that_loads(
             content = store.artifacts.get(model_id)
             model = model or _prepare(model_id, content, sent)
         except (DamagedArtifact, NotFound, BadInput) as error:
-            remedies = other_remedies(str(serving.subject), layout, can_roll_back=len(chain) > 1)
+            remedies = other_remedies(active, can_roll_back=len(chain) > 1)
             if model is None:
                 problems.append(f"model {model_id[:12]} cannot be served: {error}{remedies}")
                 continue

@@ -127,7 +127,8 @@ class Models:
         """
         if hand is None and len(self.active_of_each_hand(subject, layout)) > 1:
             raise Conflict(
-                f"subject {subject!r} has an active model of each hand with layout {layout!r}; say which hand"
+                f"subject {subject!r} has an active model of each hand with layout {layout!r}; say "
+                "which hand: --hand left or --hand right"
             )
         with self._database.write() as connection:
             revision.grow(connection)
@@ -178,7 +179,7 @@ class Models:
             with self._database.read() as connection:
                 current = _current(connection, model.subject, model.layout, model.hand)
             before = current is not None and current.model == model.id and current.previous is not None
-            remedies = other_remedies(model.subject, model.layout, can_roll_back=before)
+            remedies = other_remedies(model, can_roll_back=before)
             return f"model {model.id[:12]} cannot be loaded: {error}{remedies}"
         return ""
 
@@ -191,12 +192,14 @@ class Models:
             return sound_rows(connection, table, statement, _activation_record, wanted)
 
 
-def other_remedies(subject: str, layout: str, *, can_roll_back: bool) -> str:
+def other_remedies(model: ModelRecord, *, can_roll_back: bool) -> str:
     """What helps against a damaged model where there is no backup, as the end of a sentence."""
+    hand = f" --hand {model.hand}" if model.hand else ""
     back = (
-        f", or return to the model before it: glovecal model rollback --subject {subject} --layout {layout}"
+        f", or return to the model before it: glovecal model rollback --subject {model.subject} --layout "
+        f"{model.layout}{hand}"
     )
-    return f"{back if can_roll_back else ''}, or train again: glovecal train --subject {subject}"
+    return f"{back if can_roll_back else ''}, or train again: glovecal train --subject {model.subject}{hand}"
 
 
 def _effect_names(artifact: bytes) -> dict[str, list[str]]:

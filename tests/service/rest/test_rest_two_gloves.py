@@ -18,7 +18,7 @@ HANDS = ("right", "left")
 
 @pytest.fixture
 def takes(client: RestClient, settings: Settings) -> dict[str, list[str]]:
-    """Two takes of each of anna's hands, and one of which nobody said whose it is."""
+    """Two takes of each of anna's hands, by hand; both her gloves were seen."""
     client.post("/subjects", {"name": "anna"})
     found: dict[str, list[str]] = {}
     with Store.open(settings) as store:

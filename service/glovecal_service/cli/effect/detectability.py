@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.hand.handedness import Handedness
 from glovecal_service.cli.effect.diagnosis import Expressions, reasons
-from glovecal_service.cli.take.rows import find_takes
+from glovecal_service.cli.take.rows import find_takes, takes_of
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import AsJson
+from glovecal_service.cli.terminal.options import AsJson, OnlyHand
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
 from glovecal_service.cli.terminal.refusal import Refusal
 from glovecal_service.cli.terminal.waiting import wait_for_job
@@ -54,6 +55,7 @@ def detectable(
         list[str] | None,
         typer.Option("--take", "-t", help="Take to look at; repeat. Default: the model's, or all measured."),
     ] = None,
+    hand: OnlyHand = None,
     expression: Expressions = None,
     seed: Annotated[int, typer.Option(min=0, help="Of noise, weights and controls.")] = 0,
     report: Report = None,
@@ -76,7 +78,7 @@ def detectable(
         "seed": seed,
     }
     with connect() as service:
-        address, chosen = _where(service, who, take or [])
+        address, chosen = _where(service, who, take or [], hand)
         job = service.post(address, body | chosen)["id"]
         found = wait_for_job(service, job, quiet=as_json)["result"]
         page = fetch_job_report(service, job) if report is not None else b""
@@ -97,14 +99,16 @@ def _sizes(text: str) -> list[float]:
         ) from error
 
 
-def _where(service: RestClient, who: str, takes: Sequence[str]) -> tuple[str, dict[str, Any]]:
+def _where(
+    service: RestClient, who: str, takes: Sequence[str], hand: Handedness | None
+) -> tuple[str, dict[str, Any]]:
     """The address to post to, and the takes."""
     subject = who.lower()
     if subject not in {row["name"] for row in service.get("/subjects")}:
         rows = find_takes(service.get("/takes"), takes)
         return f"/models/{who}/detectability", {"takes": [row["id"] for row in rows] or None}
     rows = service.get("/takes", {"subject": subject})
-    rows = find_takes(rows, takes) if takes else [row for row in rows if row["rotations"]]
+    rows = find_takes(rows, takes) if takes else [row for row in takes_of(rows, hand) if row["rotations"]]
     layouts = sorted({row["layout"] for row in rows})
     if not rows:
         raise Refusal(f"subject {subject} has no take with reference angles; import some with take import")
