@@ -13,12 +13,12 @@ LONG_ENOUGH_S = 60
 """Of movement, to tell an unexplained residual from noise."""
 
 
-def next_command(model: str, found: Mapping[str, Any], subject: str = "") -> str:
-    """For a diagnosis document of that model of ``subject``."""
+def next_command(model: str, found: Mapping[str, Any], subject: str = "", hand: str | None = None) -> str:
+    """For a diagnosis document of that model of ``subject``, and of ``hand`` where that is known."""
     short = model[:SHORT]
     if found.get("odd_takes"):
         without = "".join(f" --leave-out {take['id']}" for take in found["odd_takes"])
-        return _train(subject, found.get("method") or "lmc_gpr") + without
+        return _train(subject, hand, found.get("method") or "lmc_gpr") + without
     if found.get("reference_problems"):
         return f"glovecal take check {_take_of(found)}"
     named, following = found.get("named"), found.get("next_take")
@@ -26,7 +26,7 @@ def next_command(model: str, found: Mapping[str, Any], subject: str = "") -> str
         return f"glovecal record GLOVE after-mending --seconds {LONG_ENOUGH_S}"
     if named and named.get("verdict") == "named":
         if named.get("method"):
-            return _train(subject, named["method"])
+            return _train(subject, hand, named["method"])
         where = "".join(f" --rotation {name}" for name in named.get("where") or ())
         return f"glovecal add-effect {short} {named['effect']}" + where * _is_on_rotations(found)
     if following:
@@ -34,7 +34,7 @@ def next_command(model: str, found: Mapping[str, Any], subject: str = "") -> str
     if named:
         return f"glovecal add-effect {short} {named['effect']}"
     for action in found.get("actions") or ():
-        command = action_command(model, action, subject)
+        command = action_command(model, action, subject, hand)
         if command is not None:
             return command
     residual = found.get("unexplained_residual") or {}
@@ -53,17 +53,20 @@ def recording_command(following: Mapping[str, Any]) -> str:
     return f"glovecal record GLOVE {name} --seconds {following['seconds']}"
 
 
-def action_command(model: str, action: Mapping[str, Any], subject: str = "") -> str | None:
+def action_command(
+    model: str, action: Mapping[str, Any], subject: str = "", hand: str | None = None
+) -> str | None:
     """Of one action of a diagnosis; None where nothing is known that would help."""
     if action.get("method"):
-        return _train(subject, action["method"])
+        return _train(subject, hand, action["method"])
     if not action.get("saves"):
         return None
     return f"glovecal add-effect {model[:SHORT]} {action['effect']} --rotation {action['rotation']}"
 
 
-def _train(subject: str, method: str) -> str:
-    return f"glovecal train --subject {subject or 'SUBJECT'} --method {method}"
+def _train(subject: str, hand: str | None, method: str) -> str:
+    of_hand = f" --hand {hand}" if hand else ""
+    return f"glovecal train --subject {subject or 'SUBJECT'}{of_hand} --method {method}"
 
 
 def _take_of(found: Mapping[str, Any]) -> str:

@@ -23,6 +23,7 @@ class Caption:
     method: str = ""
     version: int | None = None
     made: date | None = None
+    hand: str | None = None
 
     @property
     def title(self) -> str:
@@ -60,7 +61,9 @@ def caption_of(store: Store, id: str) -> Caption:
         line = store.models.lineage(id)
     except GlovecalError:
         return Caption(id)
-    return Caption(line[0].id, line[0].subject, line[0].method, len(line), line[0].created_at.date())
+    return Caption(
+        line[0].id, line[0].subject, line[0].method, len(line), line[0].created_at.date(), line[0].hand
+    )
 
 
 def long_date(day: date) -> str:

@@ -140,7 +140,7 @@ def _summary(found: Mapping[str, Any], of: Caption) -> list[Fact]:
         facts += [Fact("Size", f"{error:.2f} degrees{beside}"), Fact("Place", f"largest error at {name}")]
     if found.get("ceiling"):
         facts.append(Fact("Ceiling", found["ceiling"]["sentence"]))
-    command = next_command(str(found.get("model", "MODEL")), found, of.subject)
+    command = next_command(str(found.get("model", "MODEL")), found, of.subject, of.hand)
     return [*facts, Fact("Next", command, is_command=True)]
 
 
@@ -227,7 +227,7 @@ def _actions(actions: Sequence[Mapping[str, Any]], of: Caption) -> list[Markup]:
         (
             item["rotation"], item.get("phrase") or item["column"], _to_try(item),
             *(degrees(item.get(f"rmse_{when}_deg")) for when in ("before", "after", "control")),
-            action_command(of.id or "MODEL", item, of.subject) or "-",
+            action_command(of.id or "MODEL", item, of.subject, of.hand) or "-",
         )
         for item in actions
     ]  # fmt: skip

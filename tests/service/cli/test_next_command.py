@@ -71,3 +71,11 @@ def test_a_recording_asked_for_by_an_earlier_service_has_its_command():
     following = {"what": "Move.", "seconds": 25, "separates": ["creep", "hysteresis"]}
     found = {"named": None, "next_take": following}
     assert next_command(MODEL, found) == "glovecal record GLOVE deciding --seconds 25"
+
+
+def test_a_training_that_is_advised_is_of_the_models_hand() -> None:
+    """Takes of both hands are refused."""
+    found = {"odd_takes": [{"id": "0123456789ab"}], "method": "linear"}
+    assert next_command(MODEL, found, "pia", "left") == (
+        "glovecal train --subject pia --hand left --method linear --leave-out 0123456789ab"
+    )

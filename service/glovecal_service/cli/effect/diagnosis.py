@@ -85,7 +85,7 @@ def diagnose(
         out.print(f"Model {model[:12]} ({document['method']}) of {document['subject']}, {len(takes)} takes:")
         print_diagnosis(found)
         print_ceiling(found.get("ceiling"))
-        out.print(f"\nNext: {next_command(document['id'], found, document['subject'])}")
+        out.print(f"\nNext: {next_command(document['id'], found, document['subject'], document['hand'])}")
 
 
 def print_diagnosis(found: Mapping[str, Any]) -> None:

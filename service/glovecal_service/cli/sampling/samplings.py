@@ -168,7 +168,8 @@ def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
         f"{view['capture_s']:.0f} s of capture."
     )
     if view["takes"] and view["protocol"] != "second_wearing":
-        out.print(f"Next: glovecal train --subject {view['subject']}")
+        hand = service.get(f"/takes/{view['takes'][0]}")["known_hand"]
+        out.print(f"Next: glovecal train --subject {view['subject']}" + (f" --hand {hand}" if hand else ""))
     elif view["takes"]:
         named = " ".join(f"--take {take}" for take in view["takes"])
         out.print(f"Next: glovecal quick-check --subject {view['subject']} {named} --activate")
