@@ -15,6 +15,7 @@
     python3 do.py study     the blind study of the diagnosis: figures, confusion matrix, a page (hours;
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour);
+                            study ablation: what every rule of the diagnosis is worth (hours; --minutes N);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
@@ -215,6 +216,8 @@ def paper(arguments: list[str]) -> int:
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
         return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
+    if arguments[:1] == ["ablation"]:
+        return run("python", "tests/study/ablation.py", *arguments[1:])
     if arguments[:1] == ["demos"]:
         return run("python", "tests/study/demo_table.py", *arguments[1:])
     if arguments[:1] == ["camera-errors"]:
@@ -247,6 +250,7 @@ def docs(arguments: list[str]) -> int:
         strict = ("--fail-on-warning", "--fresh-env", "--quiet", "--doctree-dir", f"{temporary}/doctrees")
         if SMOKE not in arguments:
             run("python", "docs/thresholds_page.py", groups=("docs",))
+            run("python", "docs/glossary_words.py", groups=("docs",))
         code = run("sphinx-build", *strict, "--conf-dir", "docs", ".", str(site), groups=("docs",))
         pages = sum(1 for _ in site.rglob("*.html"))
     if code == 0:

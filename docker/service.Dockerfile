@@ -1,10 +1,10 @@
 # The Glovecal service: zenoh router, real-time prediction, REST, studio, cameras, training workers.
 #   docker build -f docker/service.Dockerfile -t glovecal-service .
-#   docker build -f docker/service.Dockerfile --build-arg EXTRAS=postgres -t glovecal-service .   (without cameras)
+#   docker build -f docker/service.Dockerfile --build-arg EXTRAS="studio postgres" -t glovecal-service .   (without cameras)
 ARG BASE=python:3.11-slim-bookworm
 
 FROM $BASE AS build
-ARG EXTRAS="camera postgres"
+ARG EXTRAS="studio camera postgres"
 RUN pip install --no-cache-dir uv
 WORKDIR /src
 ENV UV_PROJECT_ENVIRONMENT=/opt/glovecal UV_NO_CACHE=1

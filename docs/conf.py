@@ -45,11 +45,11 @@ html_show_copyright = False
 html_use_index = False
 
 STUDY = ["The blind study <docs/study>"] if (HERE / "study.md").exists() else []
-TRIED = "What was tried <docs/study-tried>"
+TRIED = ("What was tried <docs/study-tried>", "What each rule is worth <docs/ablation>")
 """``python3 do.py study --page docs/study.md`` writes that page once the study has run."""
 
 NAVIGATION = {
-    "Start": ["Tutorial <docs/tutorial>", "docs/glossary"],
+    "Start": ["Tutorial <docs/tutorial>", "docs/first-day", "docs/trouble", "docs/glossary"],
     "Tasks": [
         "docs/capture",
         "Gloves and their options <docs/gloves>",
@@ -75,7 +75,7 @@ NAVIGATION = {
         "docs/thresholds",
         "Messages on the wire <client/glovecal_client/wire/README>",
     ],
-    "Project": ["As measured <docs/measured>", *STUDY, TRIED, "ARCHITECTURE", "CHANGELOG"],
+    "Project": ["As measured <docs/measured>", *STUDY, *TRIED, "ARCHITECTURE", "CHANGELOG"],
 }
 
 

@@ -79,20 +79,41 @@ def outside(request: pytest.FixtureRequest) -> Mapping[str, str]:
 
 
 COMPUTING = ("models", "paper", "study", "architecture")
+TOGETHER = ("tests/models/colour_glove/", "tests/service/studio/", "tests/models/library/")
+"""Folders whose files share something that is made once in a process, and slowly: compiled kernels and a
+database of poses, a service with a browser, a trained model."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Each worker process takes a file at a time, or one of the folders of ``TOGETHER``."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class LoadFileOrFolder(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            folder = next((each for each in TOGETHER if nodeid.startswith(each)), None)
+            return folder or super()._split_scope(nodeid)
+
+    return LoadFileOrFolder(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files that compute come between files that wait for gloves, cables and pages: both at once."""
+    """Files that compute come between files that wait for gloves, cables and pages: both at once. Folders
+    that one process runs as a whole come first: nobody waits for the last of them."""
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.path, []).append(item)
     here = Path(__file__).parent
     kinds: dict[bool, list[Path]] = {True: [], False: []}
+    place: dict[Path, float] = {}
     for path in files:
-        kinds[path.relative_to(here).parts[0] in COMPUTING].append(path)
-    place = {
-        path: (number + 0.5) / len(paths) for paths in kinds.values() for number, path in enumerate(paths)
-    }
+        within = path.relative_to(here.parent).as_posix()
+        if within.startswith(TOGETHER):
+            place[path] = -1.0
+        else:
+            kinds[within.split("/")[1] in COMPUTING].append(path)
+    for paths in kinds.values():
+        place |= {path: (number + 0.5) / len(paths) for number, path in enumerate(paths)}
     items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
 
 

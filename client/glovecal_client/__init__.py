@@ -19,12 +19,10 @@ from glovecal_client.errors import (
     UnknownDevice,
     WireError,
 )
-from glovecal_client.frame_log import FrameLog
+from glovecal_client.frame_log import FrameLog, Recording
 from glovecal_client.gap_repair import fetch_frames
 from glovecal_client.keys import GloveKeys, all_gloves, all_services, parse_glove_key, service_alive_key
-from glovecal_client.log_records import Recording
-from glovecal_client.pose_order import PoseCounts
-from glovecal_client.pose_subscriber import PoseSubscriber
+from glovecal_client.pose_subscriber import PoseCounts, PoseSubscriber
 from glovecal_client.session import DEFAULT_ENDPOINT, open_client, open_router
 from glovecal_client.wire.frame import FRAME_ENCODING, Frame, FrameFlag, decode_frame, encode_frame
 from glovecal_client.wire.pose import (

@@ -7,12 +7,18 @@
 3.10 one for the whole system. GetSystemTimePreciseAsFileTime tells Windows' time of day to 100 ns.
 
 ``time.monotonic`` is for time limits; its values are never compared with these.
+
+Which computer's monotonic clock times are of: equal for all programs of one computer until it restarts.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
 import time
+from functools import cache
+
+from glovecal_client.operating_system import boot
 
 _FROM_1601_TO_1970 = 116_444_736_000_000_000
 """Windows counts units of 100 ns since 1601."""
@@ -37,3 +43,9 @@ def wall_ns() -> int:
         ctypes.WinDLL("kernel32").GetSystemTimePreciseAsFileTime(ctypes.byref(units))
         return (units.value - _FROM_1601_TO_1970) * 100
     return time.time_ns()
+
+
+@cache
+def computer_id() -> str:
+    """16 hexadecimal digits, of which nothing about the computer can be read."""
+    return hashlib.sha256(f"glovecal {boot()}".encode()).hexdigest()[:16]

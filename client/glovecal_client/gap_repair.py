@@ -9,7 +9,7 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask
+from glovecal_client.session import ask
 from glovecal_client.wire.frame import MAX_FRAME_BYTES, Frame, FrameFlag, decode_frame
 
 _LENGTH = struct.Struct("<I")

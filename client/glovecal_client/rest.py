@@ -1,12 +1,15 @@
 """The REST client: everything the ``glovecal`` command asks of the service, and what scripts need.
 
 httpx does the HTTP (streamed uploads, pluggable transports: the same client speaks to an application inside
-its own process). It is in the extra ``[rest]``, imported when first needed.
+its own process). It is in the extra ``[rest]``, imported when first needed. Layout files are as a user writes
+them, TOML or JSON.
 """
 
 from __future__ import annotations
 
+import json
 import re
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,14 +17,15 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
+import numpy as np
+
 from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
-from glovecal_client.frames_to_predict import frames_to_predict
 from glovecal_client.installation import not_installed
-from glovecal_client.layout_file import is_json, layout_name
 
 if TYPE_CHECKING:
     import httpx
     from numpy.typing import ArrayLike
+
 
 FINISHED = ("done", "failed", "cancelled")
 _WARNING = re.compile(r'^299 \S+ "(.*)"$', re.DOTALL)
@@ -86,7 +90,14 @@ class RestClient:
         self._http.close()
 
     def get(self, path: str, query: Mapping[str, Any] | None = None) -> Any:
-        return self._json("GET", path, params=query)
+        """What is None in ``query`` is not asked for. Lists come whole, unless ``query`` has a ``limit``."""
+        given = {name: value for name, value in (query or {}).items() if value is not None}
+        response = self._send("GET", path, params=given or None)
+        found = response.json() if response.content else None
+        while "limit" not in given and "next" in response.links:
+            response = self._send("GET", path + response.links["next"]["url"])
+            found += response.json()
+        return found
 
     def post(self, path: str, body: Any = None) -> Any:
         return self._json("POST", path, json=body)
@@ -287,3 +298,47 @@ def _import_httpx() -> Any:
     except ModuleNotFoundError as error:
         raise ClientError(not_installed("the REST client", "httpx")) from error
     return httpx
+
+
+def layout_name(content: bytes, file: Path) -> str:
+    """The ``name`` in a layout file, else the file's own name; the service judges whether it can be one."""
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+
+    try:
+        document = json.loads(content) if is_json(file) else tomllib.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError):
+        document = None
+    name = document.get("name") if isinstance(document, dict) else None
+    return name if isinstance(name, str) else file.stem.lower()
+
+
+def is_json(file: Path) -> bool:
+    return file.suffix.lower() == ".json"
+
+
+def frames_to_predict(
+    readings: ArrayLike,
+    sensors: Sequence[str] | None,
+    time_s: ArrayLike | None,
+    context: Mapping[str, ArrayLike] | None,
+    wearing: str | None,
+) -> dict[str, Any]:
+    """``readings`` (N, S) raw counts, ``time_s`` (N,), ``context`` columns (N,); what is None is left out."""
+    body: dict[str, Any] = {"readings": np.asarray(readings, dtype=float).tolist()}
+    if sensors is not None:
+        body["sensors"] = list(sensors)
+    if time_s is not None:
+        body["time_s"] = np.asarray(time_s, dtype=float).tolist()
+    if context is not None:
+        body["context"] = {name: _or_none(column) for name, column in context.items()}
+    if wearing is not None:
+        body["wearing"] = wearing
+    return body
+
+
+def _or_none(column: ArrayLike) -> list[float | None]:
+    """JSON has no NaN."""
+    return [None if np.isnan(value) else value for value in np.asarray(column, dtype=float).tolist()]

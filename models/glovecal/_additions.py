@@ -9,25 +9,19 @@ from typing import TYPE_CHECKING, cast
 from glovecal._calls import Progress, library_call
 from glovecal._effects import declared, is_declaration
 from glovecal._model import CalibrationModel, inner_model
-from glovecal._plotting import MODEL, SCALE, axes_for, finished, named_rows
-from glovecal._shown import Shown
-from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.presentation.document import Answer, Presentation
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from glovecal_models.calibration.model import CalibrationModel as InnerModel
     from glovecal_models.calibration.training_settings import Method, TrainingSettings
     from glovecal_models.improvement.addition import Addition as InnerAddition
 
-COLUMNS = (Column("rotation"), Column("before_rmse_deg"), Column("after_rmse_deg"), Column("learned"))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Addition(Shown):
+class Addition(Answer):
     """What became of an effect that was added: a model that has it, or why it was undone."""
 
     inner: InnerAddition
@@ -65,31 +59,11 @@ class Addition(Shown):
         """What was learned, for each rotation; units in the names."""
         return self.inner.parameters
 
-    def table(self) -> Table:
-        """One row for each rotation."""
-        before, after = self.inner.before, self.inner.after
-        rows = [
-            (name, before.rmse_deg(name), after.rmse_deg(name), self._learned(name))
-            for name in self.rotations
-        ]
-        return Table.of(COLUMNS, rows, after=[self.sentence])
+    def presentation(self) -> Presentation:
+        from glovecal_models.improvement.answer import EffectAdded
+        from glovecal_models.improvement.text import effect_tried
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Held-out error of each rotation before and after; gives the axes back."""
-        axes = axes_for(ax, len(self.rotations))
-        for shift, when, found, color in (
-            (-0.18, "before", self.inner.before, SCALE),
-            (0.18, "after", self.inner.after, MODEL),
-        ):
-            rows = [row + shift for row in range(len(self.rotations))]
-            errors = [found.rmse_deg(name) for name in self.rotations]
-            axes.barh(rows, errors, height=0.34, color=color, label=f"{when} {self.effect}")
-        named_rows(axes, self.rotations)
-        axes.set_xlabel("held-out error (degrees)")
-        return finished(axes)
-
-    def _learned(self, rotation: str) -> str:
-        return ", ".join(f"{name} {value:.3g}" for name, value in self.parameters.get(rotation, {}).items())
+        return EffectAdded(**effect_tried(self.inner)).presentation()
 
 
 def add_effect(

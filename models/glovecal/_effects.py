@@ -7,7 +7,7 @@ from typing import TypeVar, overload
 
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
-from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.effect import Effect, kind_of
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 
@@ -35,7 +35,7 @@ class Catalogue(Mapping[str, Effect], Shown):
     def table(self) -> Table:
         """One row for each effect: its name, how it acts on a model, the context columns it needs."""
         rows = [
-            (name, item.kind, ", ".join(f"c.{column}" for column in item.context), item.explanation)
+            (name, kind_of(item), ", ".join(f"c.{column}" for column in item.context), item.about.explanation)
             for name, item in self._known.items()
         ]
         return Table.of(COLUMNS, rows)
@@ -61,9 +61,10 @@ def register_effect(effect: type[Effect] | Effect) -> type[Effect] | Effect:
 
     A notebook needs no package for it; a model that holds the effect is predicted with only where the effect
     is known, so install it as an entry point before you hand the model on. Running the cell again replaces
-    the effect. Raises BadInput when the name belongs to another effect.
+    the effect. Raises BadInput when the name belongs to another effect, and for relations to one that is not
+    known.
     """
-    from glovecal_models.effects.catalogue import registered_effects
+    from glovecal_models.effects.catalogue import check_relations, registered_effects
 
     instance = effect() if isinstance(effect, type) else effect
     if not isinstance(instance, Effect):
@@ -74,6 +75,7 @@ def register_effect(effect: type[Effect] | Effect) -> type[Effect] | Effect:
     before = known.get(instance.name)
     if before is not None and _home(before) != _home(instance):
         raise BadInput(f"there is an effect {instance.name!r} already; give yours another name")
+    check_relations({**known, instance.name: instance})
     known[instance.name] = instance
     return effect
 

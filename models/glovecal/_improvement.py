@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,25 +12,18 @@ from glovecal._calls import Progress, library_call
 from glovecal._diagnosis import Diagnosis
 from glovecal._layouts import LayoutLike, layout_for
 from glovecal._model import CalibrationModel
-from glovecal._plotting import CONTROL, FLOOR, MODEL, SCALE, axes_for, finished, named_rows
-from glovecal._shown import Shown
-from glovecal._table import Column, Table
 from glovecal._takes import takes_in
+from glovecal_models.presentation.document import Answer, Presentation
 from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from glovecal_models.calibration.training_settings import Method
     from glovecal_models.improvement.improvement import Improvement as InnerImprovement
 
-COLUMNS = (Column("calibration"), Column("rmse_deg"), Column("with_control_rmse_deg"), Column("rotations"))
-NOISE_FLOOR = "noise floor"
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Improvement(Shown):
+class Improvement(Answer):
     """The fall of the error: from no calibration through every effect added down to the noise floor."""
 
     inner: InnerImprovement
@@ -77,39 +70,15 @@ class Improvement(Shown):
     @property
     def diagnosis(self) -> Diagnosis | None:
         """The last one: what is left, and what to record next."""
-        return None if self.inner.diagnosis is None else Diagnosis(self.inner.diagnosis)
+        from glovecal_models.diagnosis.text import missing_effects
 
-    def table(self) -> Table:
-        """Simpler calibrations, every step, and the noise floor."""
-        rows: list[tuple[str | float | None, ...]] = [
-            (name, error, None, None) for name, error in self.inner.baselines.items()
-        ]
-        for step in self.inner.steps:
-            label = self.inner.models[0].method if step.added is None else f"+ {step.added.effect}"
-            where = None if step.added is None else ", ".join(step.added.where)
-            rows.append((label, step.rmse_deg, step.control_rmse_deg, where))
-        rows.append((NOISE_FLOOR, self.noise_floor_deg, None, None))
-        return Table.of(COLUMNS, rows, after=self.sentences)
+        found = self.inner.diagnosis
+        return None if found is None else Diagnosis(found, missing_effects(found))
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """The fall of the error as bars, each effect beside its control; gives the axes back."""
-        rows = self.table().rows[:-1]
-        axes = axes_for(ax, len(rows))
-        simpler = len(self.inner.baselines)
-        for row, (_, error, control, _) in enumerate(rows):
-            axes.barh(row, _degrees(error), color=SCALE if row < simpler else MODEL)
-            if control is not None:
-                axes.plot(_degrees(control), row, "D", color=CONTROL, label="with the control instead")
-        if self.noise_floor_deg is not None:
-            axes.axvline(self.noise_floor_deg, color=FLOOR, linestyle="--", label=NOISE_FLOOR)
-        named_rows(axes, [str(row[0]) for row in rows])
-        axes.set_xlim(left=0.0)
-        axes.set_xlabel("held-out error (degrees)")
-        return finished(axes)
+    def presentation(self) -> Presentation:
+        from glovecal_models.improvement.text import improved
 
-
-def _degrees(value: Any) -> float:
-    return float("nan") if value is None else float(value)
+        return improved(self.inner).presentation()
 
 
 def improve(

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
+from glovecal._layouts import LayoutLike, layout_for
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.layout import Layout
+from glovecal_models.presentation.document import AboutTakes, TakeNamed
+from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
     from glovecal_models.calibration.model import CalibrationModel as InnerModel
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
+    from glovecal_models.effects.base.effect import Effect
+
+Found = TypeVar("Found", bound=AboutTakes)
 
 COLUMNS = (
     Column("rotation"), Column("read_from"), Column("samples"), Column("held_out_rmse_deg"),
@@ -105,6 +113,32 @@ def inner_model(model: CalibrationModel | InnerModel) -> InnerModel:
     if not isinstance(found, InnerModel):
         raise BadInput(f"a calibration model is wanted, not a {type(model).__name__}")
     return found
+
+
+def on_takes(
+    takes: Sequence[Take],
+    model: CalibrationModel | InnerModel | None = None,
+    layout: LayoutLike = None,
+    own: Sequence[Effect] = (),
+) -> ModelOnTakes:
+    """The takes as ``model`` reads them, or without one by themselves. Raises BadInput."""
+    from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
+
+    if model is None:
+        return ModelOnTakes(tuple(takes), layout_for(layout, takes), own=tuple(own))
+    return ModelOnTakes.of(inner_model(model), takes, own)
+
+
+def about(found: Found, takes: Sequence[Take], model: CalibrationModel | None = None) -> Found:
+    """The answer with what was asked about."""
+    return replace(
+        found,
+        takes=[TakeNamed("", take.name) for take in takes],
+        simulated=any(take.simulated for take in takes),
+        subject="" if model is None else model.subject,
+        model=None if model is None else model.id,
+        method=None if model is None else model.method,
+    )
 
 
 def save_model(model: CalibrationModel, path: str | PathLike[str]) -> str:

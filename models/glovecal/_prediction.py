@@ -10,11 +10,12 @@ import numpy as np
 
 from glovecal._calls import library_call
 from glovecal._model import CalibrationModel, inner_model
-from glovecal._plotting import axes_for, finished
 from glovecal._shown import Shown
 from glovecal._table import Cell, Column, Table
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
+from glovecal_models.presentation.document import Chart
+from glovecal_models.presentation.drawing import legend_above, plotted
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
@@ -65,14 +66,16 @@ class Angles(Shown):
         if unknown:
             meant = did_you_mean(unknown[0], self.rotations)
             raise BadInput(f"no rotation {unknown[0]!r} was predicted; {meant}")
-        axes = axes_for(ax)
-        for name in chosen:
-            mean, sd = (item[:, self.rotations.index(name)] for item in (self.mean_deg, self.sd_deg))
-            (line,) = axes.plot(self.time_s, mean, linewidth=1.0, label=name)
-            axes.fill_between(self.time_s, mean - sd, mean + sd, color=line.get_color(), alpha=0.2)
-        axes.set_xlabel("time (s)")
-        axes.set_ylabel("angle (degrees)")
-        return finished(axes)
+
+        def draw(axes: Axes) -> None:
+            for name in chosen:
+                mean, sd = (item[:, self.rotations.index(name)] for item in (self.mean_deg, self.sd_deg))
+                (line,) = axes.plot(self.time_s, mean, linewidth=1.0, label=name)
+                axes.fill_between(self.time_s, mean - sd, mean + sd, color=line.get_color(), alpha=0.2)
+            axes.set(xlabel="time (s)", ylabel="angle (degrees)")
+            legend_above(axes, 4)
+
+        return plotted(Chart(draw, 7.0, 3.3, "Angles over time."), ax)
 
 
 def predict(model: CalibrationModel, readings: Take | np.ndarray) -> Angles:

@@ -11,6 +11,7 @@ from glovecal._layouts import LayoutLike, layout_for
 from glovecal._shown import Shown
 from glovecal._table import Column, Table
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.answer import ColumnMapping, EqualTimes, TablePreview
 from glovecal_models.takes.take import Take
 
 COLUMNS = (
@@ -50,7 +51,8 @@ def read_takes(
     reference: str | PathLike[str] | None = None,
     name: str | None = None,
     wearing: str | None = None,
-    equal_times: Literal["refuse", "spread"] = "refuse",
+    equal_times: EqualTimes = "refuse",
+    columns: Literal["guess"] | ColumnMapping | None = None,
 ) -> Takes:
     """All takes of CSV or Parquet files, in the order of their first rows.
 
@@ -58,25 +60,36 @@ def read_takes(
     (degrees) and ``c.<CONTEXT>``. ``reference``: a table of reference angles with a clock of its own; beside
     ``X.frames.csv`` it is found by itself as ``X.reference.csv``. ``layout`` refuses takes that lack a sensor
     of it. ``name`` and ``wearing`` say what the file does not; ``equal_times="spread"`` spreads frames that
-    were stamped in batches. Raises BadInput with file, line, column and value; nothing is half read.
+    were stamped in batches. ``columns`` reads tables of other programs: "guess" as ``look`` shows, or its
+    ``mapping``, corrected. Raises BadInput with file, line, column and value; nothing is half read.
     """
     from glovecal_models.calibration.samples import require_layout
     from glovecal_models.takes.angles_on_a_circle import unwrapped
+    from glovecal_models.takes.column_guess import guess_mapping
     from glovecal_models.takes.table import read_takes as read
-    from glovecal_models.takes.take_warnings import alike_once, take_warnings
+    from glovecal_models.takes.take_check import alike_once, take_warnings
 
     if reference is not None and len(paths) != 1:
         raise BadInput(f"one reference table belongs to one file of frames, not to {len(paths)}")
     beside = None if reference is None else Path(reference)
     found: list[Take] = []
-    for path in paths:
-        found += read(Path(path), beside, name=name, wearing=wearing, equal_times=equal_times)
+    for path in map(Path, paths):
+        mapping = guess_mapping(path) if columns == "guess" else columns
+        found += read(path, beside, name=name, wearing=wearing, equal_times=equal_times, mapping=mapping)
     if layout is not None:
         wanted = layout_for(layout, found)
         for take in found:
             require_layout(take, wanted)
     circle = unwrapped(found)
     return Takes(circle.takes, [*alike_once(circle.sentences), *take_warnings(circle.takes)])
+
+
+def look(path: str | PathLike[str]) -> TablePreview:
+    """What a CSV or Parquet table of any program would become: how its columns are read and why, its takes,
+    what is odd. Raises BadInput for what is no table of numbers."""
+    from glovecal_models.takes.table_preview import preview_table
+
+    return preview_table(Path(path))
 
 
 def write_takes(takes: Take | Iterable[Take], path: str | PathLike[str]) -> list[Path]:

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from typing import NoReturn
 
 from glovecal_client.installation import install_command
-from glovecal_client.standard_streams import run_command
+from glovecal_client.program import run_command
 
 
 def script() -> NoReturn:

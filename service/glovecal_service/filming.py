@@ -11,8 +11,7 @@ from pathlib import Path
 
 from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
-from glovecal_client.pictures.preview import write_preview
-from glovecal_client.pictures.video_file import times_path
+from glovecal_client.pictures.video_file import times_path, write_preview
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_service.store.blobs import require_room
@@ -52,7 +51,14 @@ class Filming:
             require_room(self._folder)
             name = time.strftime("%Y%m%d-%H%M%S") + f"-{clock_ns() % 1000:03d}"
             self._source, self._file = source, self._folder / f"{name}.mkv"
-            command = [sys.executable, "-P", "-m", "glovecal_client.pictures.film", source, str(self._file)]
+            command = [
+                sys.executable,
+                "-P",
+                "-m",
+                "glovecal_client.pictures.recording",
+                source,
+                str(self._file),
+            ]
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
             )

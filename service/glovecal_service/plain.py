@@ -1,19 +1,34 @@
-"""Values made safe for an answer: no NaN, no lone surrogates, nothing of numpy, no library's words."""
+"""Answers as JSON and back: no NaN, no lone surrogates, nothing of numpy, no library's words."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime
 from pathlib import PurePath
-from typing import Any
+from threading import Lock
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from glovecal_client.errors import ClientError
 from glovecal_models.errors import reason_of as reason_of_models
 
 LONGEST_TEXT = 2000
+TOTAL = "X-Total-Count"
+"""Header of a list that is answered in parts: how many rows there are in all."""
+MOST_TRIES = 100
+Found = TypeVar("Found")
+_adapters: dict[Any, TypeAdapter[Any]] = {}
+_making_one = Lock()
+
+
+class Row(BaseModel):
+    """What REST lists, read by attribute wherever it is shown."""
+
+    model_config = ConfigDict(frozen=True)
 
 
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:
@@ -46,3 +61,31 @@ def plain(value: Any) -> Any:
 def reason_of(error: BaseException) -> str:
     """What a person can be told of an error, whichever part of Glovecal or of its libraries raised it."""
     return str(error) if isinstance(error, ClientError) else reason_of_models(error)
+
+
+def document_of(answer: Any) -> dict[str, Any]:
+    """The answer as JSON-able data; NaN and infinity are null."""
+    return plain(_adapter(type(answer)).dump_python(answer))
+
+
+def json_of(answer: Any) -> bytes:
+    """The answer as the bytes of a message; NaN and infinity are null."""
+    return _adapter(type(answer)).dump_json(answer)
+
+
+def read(kind: type[Found], document: Any) -> Found:
+    """An answer as its type has it. Raises pydantic.ValidationError."""
+    return _adapter(kind).validate_python(document)
+
+
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    """Made once: it parses the source of ``kind`` for its fields' docstrings, which costs more than any
+    answer. CPython 3.11 counts how deep it is in a syntax tree for all threads together, and raises
+    SystemError where another one parses too: then it is made again, ``MOST_TRIES`` times at most."""
+    with _making_one:
+        for _ in range(MOST_TRIES):
+            if kind in _adapters:
+                break
+            with suppress(SystemError):
+                _adapters[kind] = TypeAdapter(kind)
+        return _adapters[kind] if kind in _adapters else TypeAdapter(kind)

@@ -20,14 +20,21 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from multiprocessing.process import BaseProcess
 from threading import Event, Thread
 from typing import Any, Protocol
 
+from glovecal_client.installation import not_installed
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
-from glovecal_client.signals import handle_signals, leave_signals_to_the_parent
-from glovecal_client.standard_streams import guard_streams, never_wait, say
+from glovecal_client.program import (
+    guard_streams,
+    handle_signals,
+    leave_signals_to_the_parent,
+    never_wait,
+    say,
+)
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
@@ -176,6 +183,8 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     """Why the service cannot start here, "" if it can. Also brings the store up to date, once for all."""
     if problem := _ports_problem(parts):
         return problem
+    if settings.studio and find_spec("nicegui") is None:
+        return f"{not_installed('the studio', 'nicegui')} (or leave it out: glovecal serve --no-studio)"
     try:
         Store.open(settings).close()
     except (GlovecalError, OSError) as error:
@@ -307,7 +316,7 @@ def real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -
 
 def recorder(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:
     """The recorder process."""
-    from glovecal_service.recorder.process import run_recorder
+    from glovecal_service.recorder.recorder import run_recorder
 
     run_recorder(settings, stopped, started)
 

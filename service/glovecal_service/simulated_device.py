@@ -26,17 +26,17 @@ from glovecal_client.errors import BadOption, ClientError, DeviceFinished, Devic
 from glovecal_client.rest import RestClient
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.sampling.protocol import Step
-from glovecal_models.simulation.asked_hand import AskedHand
 from glovecal_models.simulation.protocol import MOTIONS, Segment, free_segment, segments
-from glovecal_models.simulation.simulated_glove import LAYOUTS, SimulatedGlove
-from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
-from glovecal_models.simulation.simulated_take import (
+from glovecal_models.simulation.simulated_glove import (
+    LAYOUTS,
     REFERENCE_NOISE_DEG,
     Performance,
+    SimulatedGlove,
     duration_s,
     measured_rotations,
 )
-from glovecal_models.simulation.touching import PreparedTouches, RealTouches
+from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
+from glovecal_models.simulation.touching import AskedHand, PreparedTouches, RealTouches
 
 # A simulated person who looks at the page of the service: does what the open sampling asks, else rests.
 
@@ -46,7 +46,7 @@ LOOK_EVERY_S = 0.15
 RESTING = ("paused", "done", "stopped")
 
 
-class AskedPerson:
+class SimulatedSubject:
     """Rotations as a function of time that only goes on; what is asked is looked up in a thread.
 
     The newest open sampling counts. While the service does not answer, the person goes on with the last step.
@@ -75,7 +75,7 @@ class AskedPerson:
         return angles[:, self._order], (step.pose if step else "",) * len(time_s)
 
 
-def _look(person: weakref.ref[AskedPerson], service: str) -> None:
+def _look(person: weakref.ref[SimulatedSubject], service: str) -> None:
     """As long as the person is there."""
     with RestClient(service, patience_s=5.0) as client:
         while (there := person()) is not None:
@@ -166,6 +166,8 @@ class SimulatedDevice:
 
     simulated = True
     option_help = OPTION_HELP
+    usage = "simulated"
+    about = "No glove: a simulated hand in a simulated CyberGlove."
     context: tuple[str, ...] = ()
 
     def __init__(self, options: SimulationOptions | None = None) -> None:
@@ -246,7 +248,7 @@ class SimulatedDevice:
         if options.motion == ASKED:
             planned, performance = (
                 iter(()),
-                AskedPerson(glove.hand, glove.rotations, options.seed, options.wearing, options.service),
+                SimulatedSubject(glove.hand, glove.rotations, options.seed, options.wearing, options.service),
             )
         else:
             planned = _planned_segments(options)

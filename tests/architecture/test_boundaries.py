@@ -62,12 +62,23 @@ def test_there_is_one_pool_of_processes():
         ), path
 
 
+def is_of_answers(module: str) -> bool:
+    """Types of answers and how they are shown, and no mathematics."""
+    name = module.split(".")
+    return name[:2] == ["glovecal_models", "presentation"] or (
+        name[0] in ("glovecal_models", "glovecal_service") and name[-1] == "answer"
+    )
+
+
 def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():
-    """It asks REST's own routes in its process, and has neither the mathematics nor the store."""
+    """It asks REST's own routes in its process, and has neither the mathematics nor the store: of the models
+    and of REST only the types of answers."""
     allowed = (
+        "glovecal_service.plain",
         "glovecal_service.studio",
         "glovecal_service.settings",
         "glovecal_service.rest.http.observation",
+        "glovecal_models.presentation",
     )
     for path in sorted((SOURCES["service"] / "studio").rglob("*.py")):
         for node in nodes(path):
@@ -76,8 +87,18 @@ def test_a_page_of_the_studio_computes_nothing_that_rest_cannot_give():
             ours = [
                 name for name in names if name and name.startswith(("glovecal_models", "glovecal_service"))
             ]
-            wrong = [name for name in ours if not name.startswith(allowed)]
+            wrong = [name for name in ours if not name.startswith(allowed) and not is_of_answers(name)]
             assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
+
+
+def test_what_rest_answers_is_types_and_no_work():
+    """The command line and the studio read them, and load nothing for it but what checks them."""
+    work = {"fastapi", "starlette", "numpy", "zenoh", "sqlalchemy", "nicegui", "scipy"}
+    for path in sorted((SOURCES["service"] / "rest").rglob("answer.py")):
+        assert not imports(path) & work, path
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        functions = [node.name for node in body if isinstance(node, ast.FunctionDef)]
+        assert not functions, f"{path.relative_to(ROOT)} does something: {functions}"
 
 
 def test_a_page_of_the_studio_has_time_on_a_busy_computer():

@@ -24,7 +24,7 @@ def imported(file: Path) -> set[str]:
 
 def test_no_emulator_imports_a_line_of_the_client() -> None:
     files = sorted(EMULATORS.rglob("*.py"))
-    assert len(files) > 10
+    assert len(files) >= 10
     for file in files:
         wrong = {name for name in imported(file) if name.startswith("glovecal_client")}
         assert not wrong, f"{file.relative_to(ROOT)} imports {sorted(wrong)}"

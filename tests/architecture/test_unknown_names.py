@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import glovecal_client.names
+import glovecal_client.keys
 import glovecal_models.names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -16,7 +16,7 @@ PRODUCT = ("client/glovecal_client", "models/glovecal_models", "models/glovecal"
 LISTING = re.compile(r"\b(there are|known are|installed are|built in are|it has|examined were) $")
 
 
-@pytest.mark.parametrize("names", [glovecal_client.names, glovecal_models.names])
+@pytest.mark.parametrize("names", [glovecal_client.keys, glovecal_models.names])
 def test_the_nearest_name_comes_first(names) -> None:
     known = ("hysteresis", "creep", "lag")
     assert names.did_you_mean("histeresis", known) == (

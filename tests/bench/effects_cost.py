@@ -13,11 +13,13 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.effects.catalogue import stored_effect
-from glovecal_service.realtime.corrected_frames import corrected
-from glovecal_service.realtime.glove_lane import GloveLane
+from glovecal_models.effects.catalogue import (
+    stored_correction,
+)
+from glovecal_service.realtime.glove_lanes import GlovePipeline
+from glovecal_service.realtime.lane_effects import WornGloves
+from glovecal_service.realtime.pose_loop import corrected
 from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.realtime.worn_gloves import WornGloves
 
 FRAMES = 2000
 MOST_ADDED_MS = 0.2
@@ -29,7 +31,7 @@ def cost_of_effects(base: CalibrationModel, frames_count: int = FRAMES) -> dict[
     lanes, sensors = len(names), len(base.layout.sensors)
     effects = (everywhere("hysteresis", names, [4.0]), everywhere("creep", names, [0.6, 2.4, 10.0]))
     model = ServedModel.prepare("1" * 64, replace(base, effects=effects))
-    lane, worn = GloveLane(GloveKeys("bench", "glove")), WornGloves()
+    lane, worn = GlovePipeline(GloveKeys("bench", "glove")), WornGloves()
     readings = np.random.default_rng(1).uniform(60, 190, (frames_count, sensors)).astype(np.float32)
     frames = [Frame(number, 1, number * 8_333_333, 0, row) for number, row in enumerate(readings)]
 
@@ -62,8 +64,8 @@ def cost_of_effects(base: CalibrationModel, frames_count: int = FRAMES) -> dict[
 
 def everywhere(name: str, rotations: tuple[str, ...], shape: Sequence[float]) -> AddedEffect:
     """An effect of the catalogue on all ``rotations`` with the same nonlinear parameters; small weights."""
-    lanes, effect = len(rotations), stored_effect(name, {})
-    weights = np.full((lanes, len(effect.weight_names({}))), 0.1)
+    lanes, effect = len(rotations), stored_correction(name, {})
+    weights = np.full((lanes, len(effect.weights({}).names)), 0.1)
     return AddedEffect(name, rotations, {}, np.tile(shape, (lanes, 1)), weights, np.zeros(lanes))
 
 

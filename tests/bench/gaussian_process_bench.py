@@ -35,7 +35,7 @@ from gaussian_process_data import MISSING_INPUT, OUTPUTS, Joint, one_joint, whol
 from gaussian_process_reference import Trained, exact_nlml
 
 from glovecal_models.regression.training_samples import standardise
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 PEERS = {
     "GPBoost": "gaussian_process_peer_gpboost",

@@ -10,16 +10,15 @@ from gaussian_process_reference import Hyperparameters, Trained
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.layout import Correspondence, Layout
+from glovecal_models.regression.factorisation import pivoted_cholesky
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.low_rank_likelihood import NystromFit
-from glovecal_models.regression.merged_samples import MergedSamples
-from glovecal_models.regression.pivoted_cholesky import pivoted_cholesky
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.profiled_likelihood import NystromFit
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.regression.served_nodes import NodeChooser
 from glovecal_models.regression.spgp import fit_spgp
-from glovecal_models.regression.training_samples import standardise
+from glovecal_models.regression.training_samples import MergedSamples, standardise
 
 
 def train(inputs: np.ndarray, target: np.ndarray) -> tuple[Trained, ProcessRegressor]:

@@ -22,13 +22,11 @@ import numpy as np
 
 from glovecal_models.hand.rotations import FINGERS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Touch
-from glovecal_models.inverse_kinematics.follow import STILL_DEG, TIP_TOLERANCE_MM, follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import STILL_DEG, TIP_TOLERANCE_MM, HandShape, follow
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
 from glovecal_models.simulation.touching import touching_segment
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 FRAMES, RATE_HZ = 176, 60.0
 OFF_DEG = 5.0

@@ -34,12 +34,11 @@ from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.kernel_candidates import CANDIDATES
 from glovecal_models.regression.kernel_scores import KernelScores
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.clock_scan import aligned, clock_offsets
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 SAMPLES = 1000

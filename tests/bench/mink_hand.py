@@ -14,9 +14,8 @@ import mujoco
 import numpy as np
 
 from glovecal_models.hand.rotations import FINGERS, WRIST
-from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.hand.skeleton_document import skeleton_document
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
+from glovecal_models.hand.skeleton import Skeleton, skeleton_document
+from glovecal_models.sampling.inverse_kinematics.follow import HandShape
 
 TOUCH_COST = 30.0
 """Per mm, beside the shape's 1 per standard deviation."""

@@ -16,10 +16,9 @@ from glovecal_models.calibration.training_settings import METHODS, TrainingSetti
 from glovecal_models.comparison.compare import compare
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.take import Take
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 SEED, ROTATION, SUBJECT = 1, "IM_ABD", "demo-subject"
 NAMES = {"raw": "raw readings", "linear": "linear", "lmc_gpr": "LMC-GPR", "spgp": "SPGP 100"}

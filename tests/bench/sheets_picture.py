@@ -14,8 +14,7 @@ import numpy as np
 import pypdfium2
 
 from glovecal_models.colour_glove.pattern import printed_pattern
-from glovecal_models.colour_glove.sheets.calibration_board import board_sheet
-from glovecal_models.colour_glove.sheets.colour_card import colour_card
+from glovecal_models.colour_glove.sheets.calibration_board import board_sheet, colour_card
 from glovecal_models.colour_glove.sheets.glove_sheets import glove_sheets, patch_sheets
 from glovecal_models.colour_glove.sheets.sheet import Sheet, write_sheets
 from glovecal_models.colour_glove.skin import hand_skin

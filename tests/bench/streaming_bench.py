@@ -30,14 +30,13 @@ from effects_cost import FRAMES, cost_of_effects, everywhere, sentence
 from streaming_load import Load, ProcessCost, drive
 
 from glovecal_client.keys import all_services
-from glovecal_client.queries import ask_json
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, open_client
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.serve import Lifeline, real_time, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store

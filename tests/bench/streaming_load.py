@@ -25,8 +25,7 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer
 from glovecal_client.keys import GloveKeys, all_gloves
-from glovecal_client.queries import ask_json
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, open_client
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_client.wire.pose import PoseFlag
 from glovecal_models.layout import Layout

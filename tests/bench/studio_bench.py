@@ -34,7 +34,7 @@ from studio_support import running_browser
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
 from glovecal_models.calibration.artifact import dump
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.serve import real_time, web
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store

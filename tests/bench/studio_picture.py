@@ -13,8 +13,8 @@ from pathlib import Path
 from playwright.sync_api import Browser, Page, ViewportSize, expect
 from studio_support import running_browser, with_calibration
 
-from glovecal_service.demo.hidden_session import hidden_session
 from glovecal_service.demo.processes import demo_place, running_service
+from glovecal_service.first_run.hidden_session import hidden_session
 from glovecal_service.settings import Settings
 
 FILE = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "studio.png"

@@ -28,22 +28,21 @@ from asked_session import RECORDING, asked_session
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.prior_mean import planes_of
+from glovecal_models.calibration.template import planes_of
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import PALM, WRIST
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
-from glovecal_models.inverse_kinematics.hand_shape import predicted_hand
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.sampling.catalogue import ProtocolName, make_protocol
 from glovecal_models.sampling.guided.guided_calibration import guided_calibration
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains
+from glovecal_models.sampling.inverse_kinematics.follow import predicted_hand
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.sampling.template.template_samples import template_calibration
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, SimulatedTake, simulate_take
 from glovecal_models.simulation.simulated_hand import ROTATIONS, SimulatedHand
-from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
 from glovecal_models.simulation.touching import touching_segment
 
 FIRST = 21

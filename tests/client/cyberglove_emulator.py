@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 Persona = Literal["box", "text", "noise", "silent", "echo"]
 

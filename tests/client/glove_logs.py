@@ -15,15 +15,14 @@ from pathlib import Path
 from typing import Protocol
 
 from glovecal_client.capture.cyberglove3.device import CyberGlove3
-from glovecal_client.capture.homunculus.device import Homunculus
-from glovecal_client.capture.line_glove.device import LineGlove
-from glovecal_client.capture.lucidglove.device import LucidGlove
-from glovecal_client.capture.opencyberglove.device import OpenCyberGlove
+from glovecal_client.capture.homunculus import Homunculus
+from glovecal_client.capture.line_glove import LineGlove
+from glovecal_client.capture.lucidglove import LucidGlove
+from glovecal_client.capture.opencyberglove import OpenCyberGlove
 from glovecal_client.capture.stream.streamed_glove import StreamedGlove
-from glovecal_service.emulators import line_glove
+from glovecal_service.emulators import lines
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.emulators.homunculus import EmulatedHomunculus
-from glovecal_service.emulators.lucidglove import EmulatedLucidGlove
+from glovecal_service.emulators.lines import EmulatedHomunculus, EmulatedLucidGlove
 from glovecal_service.emulators.opencyberglove import EmulatedOpenCyberGlove
 
 Values = tuple[float, ...]
@@ -73,7 +72,7 @@ def _cyberglove3() -> list[tuple[bytes, Values]]:
     return found
 
 
-def line_device(folder: Path, text: str = line_glove.DESCRIPTION, **options: str) -> LineGlove:
+def line_device(folder: Path, text: str = lines.DESCRIPTION, **options: str) -> LineGlove:
     """The driver for a description, which is kept in ``folder``."""
     file = folder / "glove.toml"
     file.write_text(text)
@@ -98,7 +97,7 @@ CASES: Mapping[str, Case] = {
     ),
     "homunculus": Case(_options(Homunculus), lambda: _sent(EmulatedHomunculus(), 60), False, True),
     "line": Case(
-        _described, lambda: _sent(line_glove.EmulatedLineGlove(), 50), True, True
+        _described, lambda: _sent(lines.EmulatedLineGlove(), 50), True, True
     ),
     "opencyberglove": Case(
         _options(OpenCyberGlove), lambda: _sent(EmulatedOpenCyberGlove(), 120), True, False

@@ -15,7 +15,7 @@ from glove_logs import CASES, Values, flipped_bit, line_device, lost_byte, recor
 
 from glovecal_client.capture.cyberglove.record import Record, RecordFormat, RecordReader
 from glovecal_client.capture.stream.parser import Sample
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 RANDOM_BYTES, CHUNK, DAMAGED = 10_000_000, 4096, 6000
 Damage = Callable[[bytes, random.Random], bytes]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glovecal_client.capture.stream.arrival_times import ArrivalTimes
+from glovecal_client.capture.device_clock import ArrivalTimes
 
 
 @given(

@@ -15,8 +15,9 @@ import pytest
 from loopback import free_endpoint
 
 from glovecal_client import Frame, FrameLog, GloveKeys, encode_frame
-from glovecal_client.capture import boot
+from glovecal_client.capture import command
 from glovecal_client.capture.command import main, run_capture
+from glovecal_client.capture.daemon import CaptureSettings
 from glovecal_client.capture.log_folder import LogFolder
 
 LUCID = (
@@ -32,7 +33,7 @@ LUCID = (
 @pytest.fixture(autouse=True)
 def for_all_users(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python as if it were installed where every user can read it."""
-    monkeypatch.setattr(boot.sys, "prefix", "/opt/glovecal")
+    monkeypatch.setattr(command.sys, "prefix", "/opt/glovecal")
 
 
 def unit_of(root: Path, name: str = "right") -> RawConfigParser:
@@ -81,7 +82,7 @@ def test_systemd_accepts_the_unit(tmp_path: Path) -> None:
 
 def test_udev_accepts_the_rule(tmp_path: Path) -> None:
     rule = tmp_path / "60-glovecal.rules"
-    rule.write_text(boot.RULE)
+    rule.write_text(command.RULE)
     udevadm = shutil.which("udevadm")
     if udevadm is None or subprocess.run([udevadm, "verify", "--help"], capture_output=True).returncode:
         pytest.skip("needs udevadm of systemd 254 or later: apt-get install udev")
@@ -90,7 +91,7 @@ def test_udev_accepts_the_rule(tmp_path: Path) -> None:
 
 
 def test_what_systemd_would_expand_is_written_as_it_is() -> None:
-    text = boot.unit_text("n", "right", ["--option", 'port=/dev/my "50 %" $glove'], dials_in=False)
+    text = command.unit_text("n", "right", ["--option", 'port=/dev/my "50 %" $glove'], dials_in=False)
     assert '--option "port=/dev/my \\"50 %%\\" $$glove" --data' in text
 
 
@@ -108,7 +109,7 @@ def test_a_capture_that_cannot_be_is_refused(tmp_path: Path, capsys, device: str
 
 
 def test_python_in_a_home_folder_is_refused(tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(boot.sys, "prefix", "/home/anna/.venv")
+    monkeypatch.setattr(command.sys, "prefix", "/home/anna/.venv")
     assert main((*LUCID, "--install-unit", str(tmp_path))) == 1
     assert (
         "cannot read /home/anna/.venv: move it to a folder that all users can read" in capsys.readouterr().err
@@ -133,14 +134,14 @@ def recording(tmp_path: Path) -> Path:
 
 def test_a_run_ends_at_its_share_of_the_limit_and_the_oldest_runs_go(recording: Path, tmp_path: Path) -> None:
     said: list[str] = []
-    data, endpoint, limit = tmp_path / "data", free_endpoint(), 30_000
+    limit = 30_000
+    settings = CaptureSettings(
+        GloveKeys("lab", "g1"), endpoints=(free_endpoint(),), data=tmp_path / "data", log_limit=limit
+    )
     runs = [
-        run_capture(
-            f"replay:{recording}", "g1", options={"speed": "20", "loop": "yes"}, data=data,
-            endpoints=(endpoint,), log_limit=limit, report=said.append,
-        )
+        run_capture(f"replay:{recording}", settings, {"speed": "20", "loop": "yes"}, report=said.append)
         for _ in range(3)
-    ]  # fmt: skip
+    ]
     assert [run.log_is_full for run in runs] == [True] * 3
     assert [run.log.exists() for run in runs] == [False, False, True]
     assert sum(log.stat().st_size for log in runs[0].log.parent.glob("*.glvlog")) <= limit

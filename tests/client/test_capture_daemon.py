@@ -29,7 +29,7 @@ from glovecal_client import (
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
 from glovecal_client.capture.device import Reading
 from glovecal_client.capture.stream.parser import Counters
-from glovecal_client.queries import ask, ask_json
+from glovecal_client.session import ask, ask_json
 
 KEYS = GloveKeys("lab", "g1")
 

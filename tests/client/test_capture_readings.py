@@ -9,9 +9,15 @@ import pytest
 from loopback import eventually
 from signal_generator import SignalGenerator, values_of
 
-from glovecal_client.capture.device import Device, Reading, build_device, check_description, device_names
-from glovecal_client.capture.reading_check import ReadingCheck
-from glovecal_client.capture.reopening_device import ReopeningDevice
+from glovecal_client.capture.daemon import ReadingCheck
+from glovecal_client.capture.device import (
+    Device,
+    Reading,
+    ReopeningDevice,
+    build_device,
+    check_description,
+    device_names,
+)
 from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, UnknownDevice
 
 

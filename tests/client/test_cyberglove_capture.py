@@ -11,7 +11,8 @@ from test_cyberglove_driver import POSIX_ONLY, in_layout_order
 
 from glovecal_client import Frame, GloveKeys, Recording, decode_frame, open_router
 from glovecal_client.capture.command import run_capture
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_client.capture.daemon import CaptureSettings
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 pytestmark = POSIX_ONLY
 KEYS = GloveKeys("lab", "right-hand")
@@ -28,9 +29,7 @@ def test_a_cyberglove_is_captured_and_comes_back_after_its_cable_was_pulled(emul
         outcome.append(
             run_capture(
                 f"cyberglove:{emulator.path}",
-                KEYS.glove,
-                endpoints=[endpoint],
-                data=tmp_path / "data",
+                CaptureSettings(KEYS, endpoints=(endpoint,), data=tmp_path / "data"),
                 stop=stop,
             )
         )

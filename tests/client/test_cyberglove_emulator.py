@@ -2,8 +2,8 @@
 
 import pytest
 
-from glovecal_service.emulators.cyberglove.box import BITS, HARDWARE_MASK, EmulatedBox
-from glovecal_service.emulators.cyberglove.counts import SPAN_OF_BIT, counts_at
+from glovecal_service.emulators.cyberglove import BITS, HARDWARE_MASK, EmulatedBox
+from glovecal_service.emulators.hand import SPAN_OF_BIT, counts_at
 
 MASK18 = bytes([0x3F, 0xBB, 0x7B])
 MASK22 = bytes([0x7F, 0xFF, 0x7F])

@@ -2,9 +2,9 @@
 
 import pytest
 
-from glovecal_client.capture.cyberglove.order import SENSORS, hardware_order, layout_index
+from glovecal_client.capture.cyberglove.identity import SENSORS, hardware_order, layout_index
 from glovecal_models.layout import Layout
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 # bit, meaning in the sources, place among 22 sensors, place among 18 (None: not there), name in the layouts
 TABLE = [

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_client.capture.cyberglove.record import RecordFormat, RecordReader, decode_ticks
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 FORMATS = [
     RecordFormat(sensors, timestamp, status)

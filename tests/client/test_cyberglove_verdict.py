@@ -5,11 +5,11 @@ import sys
 import pytest
 from cyberglove_emulator import Persona
 
+from glovecal_client.capture.cyberglove.connection import Heard, explain
 from glovecal_client.capture.cyberglove.device import CyberGlove
-from glovecal_client.capture.cyberglove.options import CyberGloveOptions
-from glovecal_client.capture.cyberglove.verdict import Heard, explain
+from glovecal_client.capture.cyberglove.setup import CyberGloveOptions
 from glovecal_client.errors import DeviceError, DeviceLost
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 

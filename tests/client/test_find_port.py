@@ -11,7 +11,7 @@ from glovecal_client.capture.cyberglove import find_port
 from glovecal_client.capture.cyberglove.device import CyberGlove
 from glovecal_client.capture.cyberglove.find_port import find_ports, only_cyberglove, probe
 from glovecal_client.errors import DeviceError, DeviceLost
-from glovecal_service.emulators.cyberglove.box import EmulatedBox
+from glovecal_service.emulators.cyberglove import EmulatedBox
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 

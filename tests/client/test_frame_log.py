@@ -17,8 +17,7 @@ import pytest
 from loopback import eventually
 
 from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
-from glovecal_client.frame_log import MAX_WAITING, BackgroundSync
-from glovecal_client.log_records import MAX_RECORD_BYTES, cut_damaged_tail
+from glovecal_client.frame_log import MAX_RECORD_BYTES, MAX_WAITING, BackgroundSync, cut_damaged_tail
 
 META = {"glove": "g1", "sensors": ["A", "B"]}
 MESSAGES = [encode_frame(Frame(i, 7, i, i, np.array([i, -i], np.float32))) for i in range(5)]

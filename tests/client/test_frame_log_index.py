@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_client import Frame, FrameLog, decode_frame, encode_frame
-from glovecal_client.log_index import LogIndex
+from glovecal_client.capture.log_folder import LogIndex
 
 NO_BOUND = 1 << 30
 

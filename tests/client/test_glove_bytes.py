@@ -12,9 +12,9 @@ from glove_logs import LAYOUT_22, line_device
 
 from glovecal_client.capture.cyberglove3.device import CyberGlove3
 from glovecal_client.capture.device import build_device
-from glovecal_client.capture.homunculus.device import Homunculus
-from glovecal_client.capture.lucidglove.device import LucidGlove
-from glovecal_client.capture.opencyberglove.device import OpenCyberGlove
+from glovecal_client.capture.homunculus import Homunculus
+from glovecal_client.capture.lucidglove import LucidGlove
+from glovecal_client.capture.opencyberglove import OpenCyberGlove
 from glovecal_client.capture.stream.parser import Sample
 from glovecal_client.errors import BadOption
 from glovecal_models.layout import Layout

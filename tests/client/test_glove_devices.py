@@ -16,19 +16,17 @@ from glove_logs import HARDWARE_22, LAYOUT_22
 from loopback import eventually
 from test_cyberglove_driver import in_layout_order
 
-from glovecal_client.capture.device import Device, Reading, build_device
-from glovecal_client.capture.reopening_device import ReopeningDevice
+from glovecal_client.capture.device import Device, Reading, ReopeningDevice, build_device
 from glovecal_client.capture.stream.links import TcpPlace
 from glovecal_client.errors import DeviceLost
 from glovecal_models.layout import Layout
 from glovecal_service.emulators.catalogue import PROTOCOLS, faults_of
-from glovecal_service.emulators.cyberglove.emulated import EmulatedCyberGlove
-from glovecal_service.emulators.emulation import Emulation
+from glovecal_service.emulators.cyberglove import EmulatedCyberGlove
 from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
-from glovecal_service.emulators.line_glove import DESCRIPTION
+from glovecal_service.emulators.lines import DESCRIPTION
 from glovecal_service.emulators.opencyberglove import EmulatedOpenCyberGlove
-from glovecal_service.emulators.ports import Port, TcpDialer, UdpSender
+from glovecal_service.emulators.ports import Emulation, Port, TcpDialer, UdpSender
 from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")

@@ -14,7 +14,7 @@ import glovecal_models.installation
 from glovecal_client.errors import DeviceError
 from glovecal_client.pictures.source import opencv
 from glovecal_models.errors import BadInput
-from glovecal_service.camera.packages import camera_not_installed
+from glovecal_service.camera.camera_settings import camera_not_installed
 from glovecal_service.store.database import Database
 
 ROOT = Path(__file__).resolve().parents[2]

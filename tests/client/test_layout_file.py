@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from glovecal_client.layout_file import layout_name
+from glovecal_client.rest import layout_name
 
 
 @pytest.mark.parametrize(

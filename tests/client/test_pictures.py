@@ -11,8 +11,7 @@ import pytest
 
 from glovecal_client.errors import BadOption, DeviceError, DeviceFinished, DeviceLost
 from glovecal_client.pictures.recording import VideoRecording
-from glovecal_client.pictures.rendered import RenderedPictures
-from glovecal_client.pictures.source import Picture, build_source
+from glovecal_client.pictures.source import Picture, RenderedPictures, build_source
 from glovecal_client.pictures.video_file import VideoFilePictures, VideoWriter, times_path
 
 pytest.importorskip("cv2")

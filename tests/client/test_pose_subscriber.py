@@ -25,7 +25,7 @@ from glovecal_client import (
     open_client,
     open_router,
 )
-from glovecal_client.pose_order import PoseOrder
+from glovecal_client.pose_subscriber import PoseOrder
 
 KEYS = GloveKeys("lab", "g1")
 MODEL = "ab" * 32

@@ -11,7 +11,7 @@ import pytest
 
 PRINT = """
 import sys
-from glovecal_client.standard_streams import run_command
+from glovecal_client.program import run_command
 
 def command():
     print("60 \N{DEGREE SIGN} \N{FULL BLOCK}")
@@ -34,7 +34,7 @@ def test_a_sign_that_the_encoding_lacks_ends_nothing(unbuffered: str) -> None:
 LINES = 5000
 UNREAD = f"""
 import sys
-from glovecal_client.standard_streams import never_wait, run_command
+from glovecal_client.program import never_wait, run_command
 
 def command():
     never_wait()

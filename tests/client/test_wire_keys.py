@@ -9,7 +9,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-import glovecal_client.names
+import glovecal_client.keys
 import glovecal_models.names
 from glovecal_client import BadName, GloveKeys, all_gloves, all_services, parse_glove_key, service_alive_key
 from glovecal_client.keys import PLANES
@@ -19,10 +19,10 @@ identifiers = st.from_regex(r"[a-z0-9][a-z0-9_-]{0,63}\Z", fullmatch=True)
 
 
 def test_client_and_models_have_the_same_rule_for_names() -> None:
-    assert glovecal_client.names.IDENTIFIER.pattern == glovecal_models.names.IDENTIFIER.pattern
-    assert glovecal_client.names.CHANNEL.pattern == glovecal_models.names.CHANNEL.pattern
-    assert glovecal_client.names.DEVICES == glovecal_models.names.DEVICES
-    for names in (glovecal_client.names, glovecal_models.names):
+    assert glovecal_client.keys.IDENTIFIER.pattern == glovecal_models.names.IDENTIFIER.pattern
+    assert glovecal_client.keys.CHANNEL.pattern == glovecal_models.names.CHANNEL.pattern
+    assert glovecal_client.keys.DEVICES == glovecal_models.names.DEVICES
+    for names in (glovecal_client.keys, glovecal_models.names):
         with pytest.raises((BadName, BadInput), match="glove: 'com3' is not allowed: Windows keeps it"):
             names.check_identifier("com3", "glove")
         assert names.check_identifier("com3-right", "glove") == "com3-right"

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from glovecal_client.capture.device import build_device, device_names
-from glovecal_client.capture.line_glove.device import LineGlove
+from glovecal_client.capture.line_glove import LineGlove
 from glovecal_service.emulators.catalogue import PROTOCOLS
-from glovecal_service.emulators.faults import EXPLAINED
-from glovecal_service.emulators.line_glove import DESCRIPTION
+from glovecal_service.emulators.glove import EXPLAINED
+from glovecal_service.emulators.lines import DESCRIPTION
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = (DOCS / "own-glove.md").read_text(encoding="utf-8")
@@ -38,7 +38,7 @@ def test_the_description_is_the_one_that_the_emulated_glove_has(tmp_path: Path) 
 
 
 def test_every_key_of_a_description_is_explained() -> None:
-    from glovecal_client.capture.line_glove.description import _KEYS
+    from glovecal_client.capture.line_glove import _KEYS
 
     for table, keys in _KEYS.items():
         for key in keys:

@@ -10,8 +10,7 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.ceiling.black_box import left_by_box
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
-from glovecal_models.ceiling.ceiling import Gain, sign_flip_p_value, verdict_of
-from glovecal_models.ceiling.limits import CEILING_LIMITS
+from glovecal_models.ceiling.ceiling import CEILING_LIMITS, Gain, sign_flip_p_value, verdict_of
 from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
 from glovecal_models.errors import Cancelled
 from glovecal_models.layout import Layout

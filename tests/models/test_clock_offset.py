@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.clock_scan import ClockOffset, aligned, clock_offsets
 from glovecal_models.takes.table import read_takes, reference_beside
 from glovecal_models.takes.take import Take

@@ -13,7 +13,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 
 
 def make_joint(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

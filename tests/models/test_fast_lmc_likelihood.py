@@ -6,10 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import cho_factor, cho_solve
 
-from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
-from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood, NystromFit, certify
-from glovecal_models.regression.merged_samples import MergedSamples
-from glovecal_models.regression.pivoted_cholesky import pivoted_cholesky
+from glovecal_models.regression.factorisation import pivoted_cholesky
+from glovecal_models.regression.profiled_likelihood import (
+    ExactProfiledLikelihood,
+    LowRankLikelihood,
+    NystromFit,
+    certify,
+)
+from glovecal_models.regression.training_samples import MergedSamples
 
 
 def make_samples(count: int, dimensions: int, seed: int, levels: int = 40) -> tuple[np.ndarray, np.ndarray]:

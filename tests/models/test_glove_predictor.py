@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.predictor import BY_RULE, EXTRAPOLATING, TOO_UNCERTAIN, GlovePredictor
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.regression.linear_regressor import fit_linear
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import Regressor, RuleRegressor
+from glovecal_models.regression.regressor import ProcessRegressor, Regressor, RuleRegressor
 
 LAYOUT = Layout.built_in("cyberglove18")
 ROTATIONS = tuple(name for name in LAYOUT.rotations if name != "PALM_ARCH")

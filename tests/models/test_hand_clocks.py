@@ -7,10 +7,8 @@ import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.protocol import free_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import Performance
-from glovecal_models.takes.common_event import common_events
-from glovecal_models.takes.hand_clocks import TakeClock, align
+from glovecal_models.simulation.simulated_glove import Performance, SimulatedGlove
+from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
 
 CLAPS_S = (4.0, 5.1, 6.7)

@@ -10,7 +10,7 @@ from glovecal_models.calibration.sample_weight import (
 )
 from glovecal_models.calibration.text import weight_sentence
 from glovecal_models.errors import Cancelled
-from glovecal_models.regression import exact_profiled_likelihood
+from glovecal_models.regression import profiled_likelihood
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.profiled_likelihood import cholesky
 
@@ -116,7 +116,7 @@ def test_many_short_takes_are_decided_with_a_quarter_of_the_work(monkeypatch: py
         factored.append(len(matrix))
         return cholesky(matrix)
 
-    monkeypatch.setattr(exact_profiled_likelihood, "cholesky", counted)
+    monkeypatch.setattr(profiled_likelihood, "cholesky", counted)
     chosen = fit_weighted(samples)
     assert chosen.weight < 1
     assert sum(size**3 for size in factored) < 25 * len(take) ** 3

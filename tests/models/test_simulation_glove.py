@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.simulated_glove import Cloth, SimulatedGlove
-from glovecal_models.simulation.simulated_hand import DRIVEN, POSTURES, ROTATIONS, SimulatedHand
-from glovecal_models.simulation.stretch import TABLE_1, TOGETHER
+from glovecal_models.simulation.simulated_hand import (
+    DRIVEN,
+    POSTURES,
+    ROTATIONS,
+    TABLE_1,
+    TOGETHER,
+    SimulatedHand,
+)
 from glovecal_models.typical_counts import raw_angles
 
 LAYOUT = Layout.built_in("cyberglove18")

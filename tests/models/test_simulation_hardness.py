@@ -7,9 +7,8 @@ import pytest
 
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.simulation.simulated_hand import KEY_POSES, TABLE_3_POSES
-from glovecal_models.simulation.simulated_take import simulate_take
 from glovecal_models.typical_counts import raw_angles
 
 SAMPLES = 700

@@ -10,9 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput, BadTakeTable
-from glovecal_models.takes.frame_times import spread_equal_times
-from glovecal_models.takes.raw_table import LARGEST_ANGLE_DEG, LARGEST_VALUE, LONGEST_TAKE_S
-from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.raw_table import (
+    LARGEST_ANGLE_DEG,
+    LARGEST_VALUE,
+    LONGEST_TAKE_S,
+    spread_equal_times,
+)
+from glovecal_models.takes.reference_jumps import reference_warnings
 from glovecal_models.takes.table import read_reference, read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes

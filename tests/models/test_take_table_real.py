@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.errors import BadTakeTable
-from glovecal_models.takes.reference_check import reference_warnings
+from glovecal_models.takes.reference_jumps import reference_warnings
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take

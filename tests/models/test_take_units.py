@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from glovecal_models.errors import BadTakeTable
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_check import check_take
-from glovecal_models.takes.take_warnings import take_warnings
+from glovecal_models.takes.take_check import check_take, take_warnings
 
 
 def take(angle: np.ndarray, reading: np.ndarray, rate_hz: float = 60.0, name: str = "t") -> Take:

@@ -13,9 +13,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from boosted_code import boosted_code
 
-from glovecal_models.colour_glove.codes.boosted import boosted_code
-from glovecal_models.colour_glove.codes.pca import pca_code
+from glovecal_models.colour_glove.crop import distance_transform
 from glovecal_models.colour_glove.database import (
     DatabaseSettings,
     PoseDatabase,
@@ -24,8 +24,7 @@ from glovecal_models.colour_glove.database import (
     pose_database,
     rendered_views,
 )
-from glovecal_models.colour_glove.image_distance import distance_transform
-from glovecal_models.colour_glove.lookup import Code, PoseLookup
+from glovecal_models.colour_glove.lookup import Code, PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
 from glovecal_models.colour_glove.skin import configured, hand_skin

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from colour_glove_scene import HANDS, Scene, cameras, exposed, held_out_states, reprojection_px
 
-from glovecal_models.colour_glove.hand_state import HandState
-from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.colour_glove.hand_state import STAGES, HandState
 from glovecal_models.progress import Report
 
 FRAMES, QUICK_FRAMES = 100, 4

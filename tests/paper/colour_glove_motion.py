@@ -14,9 +14,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from colour_glove_scene import EXPOSURE_S, HANDS, Scene, cameras, reprojection_px
 
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.drawn.photograph import Photographer, Photography
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, HandState
+from glovecal_models.colour_glove.photograph import Photographer, Photography, hand_motion
 from glovecal_models.colour_glove.pose_set import hand_shapes
 from glovecal_models.colour_glove.skin import HandSkin
 from glovecal_models.progress import Report

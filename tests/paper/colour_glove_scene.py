@@ -16,7 +16,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import (
     ENTRIES,
     DatabaseSettings,
@@ -24,11 +23,10 @@ from glovecal_models.colour_glove.database import (
     palm_centre,
     pose_database,
 )
-from glovecal_models.colour_glove.drawn.hand_motion import ASIDE, FARTHEST_MM, NEAREST_MM
-from glovecal_models.colour_glove.drawn.photograph import Photographer, Photography
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.photograph import ASIDE, FARTHEST_MM, NEAREST_MM, Photographer, Photography
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pose.error_learning import CLIPS, drawn_colours, learned_errors, other_hand
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker

@@ -20,9 +20,9 @@ from table_3 import PAPER_DEG, SETTLED
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
+from glovecal_models.calibration.samples import sensor_sensitivity
 from glovecal_models.hand.rotations import completed
-from glovecal_models.quick_check.pose_book import own_poses
+from glovecal_models.quick_check.held_poses import own_poses
 from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes

@@ -28,17 +28,16 @@ from glovecal_models.calibration.training_settings import Method, TrainingSettin
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
-from glovecal_models.inverse_kinematics.steadied import steadied
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
 from glovecal_models.sampling.guided.guided_calibration import GuidedSamples, guided_samples
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains
+from glovecal_models.sampling.inverse_kinematics.follow import steadied
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.protocol import Segment, cross_couple_segment, evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, SimulatedTake, simulate_take
 from glovecal_models.simulation.simulated_hand import KEY_POSES, POSTURES
-from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
 from glovecal_models.simulation.touching import touching_segment
 from glovecal_models.typical_counts import raw_angles
 

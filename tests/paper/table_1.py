@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 from still_take import still_take
 
-from glovecal_models.independence.examination import RotationExamination
-from glovecal_models.independence.independence import Independence, examine_independence
-from glovecal_models.independence.text import not_examined_sentence
+from glovecal_models.independence.answer import ExaminedRotation, Independence
+from glovecal_models.independence.independence import examine_independence
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.stretch import TABLE_1
+from glovecal_models.simulation.simulated_hand import TABLE_1
 
 PAPER_IN_ALL: dict[str, tuple[float, float]] = {
     "TI_ABD": (9.6, 25.4),
@@ -56,7 +55,7 @@ def table_1(seed: int = 1) -> list[Table1Row]:
     for rotation in TABLE_1:
         item = found.of(rotation)
         if item is None:
-            why = "; ".join(map(not_examined_sentence, found.not_examined))
+            why = "; ".join(found.sentences)
             raise RuntimeError(f"{rotation} was not examined: {why}")
         paper = PAPER_IN_ALL[rotation]
         rows.append(Table1Row(rotation, None, *paper, item.std_pct, item.max_pct, None, item.is_coupled))
@@ -80,8 +79,8 @@ def examined(seed: int) -> Independence:
     return examine_independence(glove.layout, still, ranges)
 
 
-def _own_shares(item: RotationExamination) -> list[Table1Row]:
-    shares = {share.sensor: share for share in item.coupling.shares}
+def _own_shares(item: ExaminedRotation) -> list[Table1Row]:
+    shares = {share.sensor: share for share in item.affecting}
     rows = []
     for other, (std, largest) in TABLE_1[item.rotation].items():
         share = shares.get(other)
@@ -89,7 +88,7 @@ def _own_shares(item: RotationExamination) -> list[Table1Row]:
             rows.append(Table1Row(item.rotation, other, std, largest, 0.0, 0.0, None, False))
             continue
         interval = (share.std_low, share.std_high)
-        named = share.affects is not False
+        named = share.affects != "no"
         rows.append(
             Table1Row(item.rotation, other, std, largest, share.std_pct, share.max_pct, interval, named)
         )

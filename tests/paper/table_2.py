@@ -20,30 +20,28 @@ from functools import cache
 from itertools import product
 
 import numpy as np
+from ik_samples import ik_samples
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
+from glovecal_models.covariance.functions import LinearArd, SquaredExponential, SquaredExponentialArd
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Touch
-from glovecal_models.inverse_kinematics.ik_samples import ik_samples
 from glovecal_models.progress import Report
 from glovecal_models.regression.exact import fit_exact
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.mean import LinearMean, ZeroMean
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.linear_regressor import LinearMean, ZeroMean
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.sampling.inverse_kinematics.contact import Touch
 from glovecal_models.simulation.protocol import (
     WIDGET_DEG,
     cross_couple_segment,
     free_segment,
     sampling_protocol,
 )
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.simulation.touching import touching_segment
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 Fit = Callable[[np.ndarray, np.ndarray], ProcessRegressor]
 

@@ -28,9 +28,9 @@ from glovecal_models.calibration.training import assemble
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.progress import Report
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.regression.spgp import fit_spgp
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 SIZES = (20, 50, 100, 300, 500, 1000)
 PAPER: dict[int, tuple[float, float]] = {

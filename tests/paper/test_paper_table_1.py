@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from table_1 import table_1
 
-from glovecal_models.simulation.simulated_hand import POSTURES
-from glovecal_models.simulation.stretch import Stretch, bent_share, deviations, stretches
+from glovecal_models.simulation.simulated_hand import POSTURES, Stretch, bent_share, deviations, stretches
 
 
 def moved_alone(stretch: Stretch, neighbour: str) -> np.ndarray:

@@ -21,15 +21,13 @@ import pytest
 from glovecal_client.errors import DeviceFinished
 from glovecal_client.pictures.source import Picture
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import DatabaseSettings, pose_database
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
 from glovecal_models.colour_glove.pose.error_learning import errors_file
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, LearnedErrors
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import hand_skin

@@ -18,7 +18,7 @@ from jobs_counting import CountingJob
 from postgres_server import PostgresServer, find_programs
 
 from glovecal_service.jobs.dispatcher import Dispatcher
-from glovecal_service.jobs.registry import KINDS
+from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -78,6 +78,6 @@ def sqlite_store(sqlite_settings: Settings) -> Iterator[Store]:
 def dispatched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Store, Dispatcher]]:
     """A store whose jobs are run, by one pair of worker processes for all tests."""
     settings = Settings(data=tmp_path_factory.mktemp("dispatched"), database=None, artifacts=None, workers=2)
-    kinds = {**KINDS, "count": CountingJob()}
+    kinds = {**ANSWERED, "count": CountingJob()}
     with Store.open(settings) as store, Dispatcher(store, settings, kinds) as dispatcher:
         yield store, dispatcher

@@ -11,6 +11,7 @@ from realtime_support import LAYOUT, linear_model
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.effects.base.effect import CorrectionEffect
 from glovecal_models.effects.catalogue import stored_effect
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 
@@ -28,7 +29,9 @@ def added(
     """The same shape and weights on each of ``rotations``; weights that are not given are zero."""
     lanes, settings = len(rotations), settings or {}
     learned = np.array(list(weights), dtype=float)
-    missing = len(stored_effect(name, settings).weight_names(settings)) - len(learned)
+    known = stored_effect(name, settings)
+    names = known.weights(settings).names if isinstance(known, CorrectionEffect) else ()
+    missing = len(names) - len(learned)
     learned = np.pad(learned, (0, missing))
     grid = np.tile(np.array(list(shape), dtype=float), (lanes, 1))
     return AddedEffect(name, rotations, settings, grid, np.tile(learned, (lanes, 1)), np.zeros(lanes))

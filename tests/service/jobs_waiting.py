@@ -10,7 +10,7 @@ from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
 
 
-def wait_for(condition: Callable[[], Any], seconds: float = 150.0) -> Any:
+def wait_for(condition: Callable[[], Any], seconds: float = 300.0) -> Any:
     """What ``condition`` answers once it is true."""
     until = time.monotonic() + seconds
     while not (answer := condition()):

@@ -15,11 +15,10 @@ from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
-from glovecal_service.realtime.corrected_frames import corrected
-from glovecal_service.realtime.glove_lane import GloveLane
-from glovecal_service.realtime.pose_loop import PoseLoop
+from glovecal_service.realtime.glove_lanes import GlovePipeline
+from glovecal_service.realtime.lane_effects import GloveContext, WornGloves
+from glovecal_service.realtime.pose_loop import PoseLoop, corrected
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
-from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
 
 
 class ByHand:
@@ -63,7 +62,7 @@ class LoopByHand:
         self.models.put(glove, ServedModel.prepare(f"{number:064x}", model))
 
     def say(self, glove: str, *, run_id: int = 1, wearing: str = "w", context: tuple[str, ...] = ()) -> None:
-        self.worn.put(glove, WornGlove(f"{run_id:016x}", wearing, context))
+        self.worn.put(glove, GloveContext(f"{run_id:016x}", wearing, context))
 
     def send(self, frames: Iterable[tuple[str, Frame]], *, together: int = 4) -> None:
         """So many frames wait whenever the loop looks."""
@@ -87,12 +86,13 @@ def served_in_turns(
 ) -> dict[str, GloveAngles]:
     """Angles by glove, before they are rounded for the wire, of turns that may hold many gloves' frames."""
     served, worn = ServedModel.prepare("1" * 64, model), WornGloves()
-    lanes: dict[str, GloveLane] = {}
+    lanes: dict[str, GlovePipeline] = {}
     found: dict[str, list[GloveAngles]] = {}
     for turn in turns:
         readings = np.array([frame.readings for _, frame in turn], dtype=np.float64)
         opened = [
-            (lanes.setdefault(glove, GloveLane(GloveKeys("lab", glove))), frame, 0) for glove, frame in turn
+            (lanes.setdefault(glove, GlovePipeline(GloveKeys("lab", glove))), frame, 0)
+            for glove, frame in turn
         ]
         angles, _ = corrected(served, opened, readings, served.predictor.predict(readings), worn)
         for row, (glove, _) in enumerate(turn):

@@ -17,7 +17,7 @@ import zenoh
 
 from glovecal_client.capture.device import Reading
 from glovecal_client.keys import GloveKeys, all_services
-from glovecal_client.queries import ask_json
+from glovecal_client.session import ask_json
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel
@@ -49,7 +49,7 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
-def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 120.0) -> Value:
+def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 240.0) -> Value:
     """The first true value of ``condition``; fails with ``what`` after the deadline."""
     end = time.monotonic() + deadline_s
     while not (value := condition()):
@@ -110,7 +110,10 @@ class WireGlove:
         self.sent = 0
         self._session = session
         self._subject = subject
-        self._raw = session.declare_publisher(self.keys.raw, express=True)
+        # what a test sends arrives: a busy computer's full queue would drop it
+        self._raw = session.declare_publisher(
+            self.keys.raw, express=True, congestion_control=zenoh.CongestionControl.BLOCK
+        )
 
     def say_meta(self, **changes: Any) -> None:
         meta = {

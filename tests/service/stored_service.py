@@ -18,6 +18,7 @@ import numpy as np
 from anyio.from_thread import start_blocking_portal
 from stored_takes import LAYOUT, make_take
 
+from glovecal_client.capture.cyberglove import find_port
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -48,6 +49,7 @@ def stored_service(folder: Path, zenoh: str) -> Iterator[StoredService]:
     app = create_app(Settings(data=folder / "data", upload_limit_mb=1, zenoh=zenoh))
     with (
         patch.object(Dispatcher, "start"),  # jobs that are begun wait: what they do has its own tests
+        patch.object(find_port, "_listed_ports", dict),  # those of this computer are nobody's business
         start_blocking_portal() as portal,
         portal.wrap_async_context_manager(app.router.lifespan_context(app)),
         httpx.Client(

@@ -34,15 +34,12 @@ from glovecal_client.pictures.label_file import LabelFilePictures
 from glovecal_client.pictures.source import Picture
 from glovecal_client.pictures.video_file import VideoFilePictures, VideoWriter, read_times
 from glovecal_client.pose_subscriber import PoseSubscriber
-from glovecal_client.queries import ask, ask_json
-from glovecal_client.session import open_router
+from glovecal_client.session import ask, ask_json, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag
-from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
-from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES
 from glovecal_models.errors import BadInput
 from glovecal_service.camera.camera_settings import CameraSettings
-from glovecal_service.camera.newest_picture import NewestPicture, NumberedPicture
-from glovecal_service.camera.picture_reader import MissingPictures
+from glovecal_service.camera.picture_reader import MissingPictures, NewestPicture, NumberedPicture
 from glovecal_service.camera.tracking_setup import RATE_HZ, RenderedGlove
 
 PICTURE = np.full((480, 640, 3), 180, np.uint8)

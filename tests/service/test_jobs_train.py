@@ -10,7 +10,8 @@ from stored_takes import LAYOUT, make_take
 from glovecal_models.calibration.artifact import dump, load, model_id
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.questions.train import TRAIN
 
 QUICK = {"samples": 120, "folds": 2}
 
@@ -86,6 +87,15 @@ def test_progress_tells_each_rotation_and_its_error(trained):
         assert f"{event.detail['held_out_rmse_deg']:.2f} degrees on held-out takes" in event.sentence
 
 
+def test_a_job_that_is_finished_twice_has_stored_one_model(trained):
+    id = create(trained, method="linear", samples=80, activate=True)
+    result, models = result_of(trained, id), len(trained.models.list("anna"))
+    plan = TRAIN.plan(trained, trained.jobs.get(id))
+    results = [task.function(task.payload, lambda: False, lambda said, share: None) for task in plan.tasks]
+    assert plan.finish(results) == result
+    assert len(trained.models.list("anna")) == models
+
+
 def test_a_child_names_its_parent(trained):
     parent = result_of(trained, create(trained, method="linear"))["model"]
     child = result_of(trained, create(trained, method="linear", samples=90, parent=parent[:8]))["model"]
@@ -95,17 +105,17 @@ def test_a_child_names_its_parent(trained):
 @pytest.mark.parametrize(
     ("payload", "sentence"),
     [
-        ({"subject": "ben"}, "subject 'ben' has no take with reference angles for layout 'two-fingers'"),
+        ({"subject": "ben"}, "no take of subject 'ben' with layout 'two-fingers' has reference angles"),
         ({"subject": "carl"}, "there is no subject 'carl'"),
         ({"layout": "knitted"}, "there is no layout 'knitted'"),
-        ({"subject": None}, "training needs 'subject' as text, not None"),
+        ({"subject": None}, "a job of kind train cannot have subject = None"),
         ({"takes": ["000000000000"]}, "there is no take '000000000000'"),
-        ({"takes": []}, "takes must be a list of take ids or null, not []"),
-        ({"takes": "all"}, "takes must be a list of take ids or null, not 'all'"),
-        ({"method": "magic"}, "unknown method 'magic'"),
-        ({"samples": -1}, "samples must be a whole number, not -1"),
-        ({"pseudo_inputs": "many"}, "pseudo_inputs must be a whole number"),
-        ({"colour": "red"}, "training does not know 'colour'"),
+        ({"takes": []}, "cannot have takes = []"),
+        ({"takes": "all"}, "cannot have takes = 'all'"),
+        ({"method": "magic"}, "cannot have method = 'magic'"),
+        ({"samples": -1}, "cannot have samples = -1"),
+        ({"pseudo_inputs": "many"}, "cannot have pseudo_inputs = 'many'"),
+        ({"colour": "red"}, "unknown key 'colour'"),
         ({"parent": "abcdef"}, "there is no model 'abcdef'"),
     ],
 )
@@ -120,13 +130,13 @@ def test_takes_that_cannot_carry_a_model_are_named(trained):
     mute = trained.takes.add(make_take(21, measured=False), subject="anna", **given).id
     stiff = trained.takes.add(still, subject="ben", **given).id
     of_ben = error_of(trained, create(trained, takes=[stiff]))
-    assert of_ben == f"take {stiff} is of subject 'ben', not of 'anna'"
+    assert of_ben == f"take {stiff} ('bending') is of subject 'ben', not 'anna'"
     never_moves = error_of(trained, create(trained, subject="ben", method="linear"))
     assert "10 degrees in all 300 samples" in never_moves
     nothing = error_of(trained, create(trained, takes=[mute], method="linear"))
-    assert "no reference angle for any rotation" in nothing
+    assert "no take of subject 'anna' with layout 'two-fingers' has reference angles" in nothing
     other = error_of(trained, create(trained, layout="cyberglove18", takes=[mute], method="linear"))
-    assert "has no sensor 'T_TMC'" in other
+    assert "has layout 'two-fingers', not 'cyberglove18'" in other
 
 
 def test_a_damaged_take_is_named(trained):

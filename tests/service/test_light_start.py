@@ -7,7 +7,7 @@ import sys
 
 PROGRAM = """
 import sys, glovecal_service.cli.command, glovecal_service.rest.app
-slow = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage", "numba", "cv2"}
+slow = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage", "numba", "cv2", "nicegui"}
 print(*(slow & set(sys.modules)))
 """
 

@@ -10,8 +10,9 @@ from loop_by_hand import moving_frames
 from realtime_support import LAYOUT
 
 from glovecal_models.comparison.compare import compare
+from glovecal_models.improvement.fall.lineage import lineage_fall
+from glovecal_models.presentation.drawing import svg
 from glovecal_models.takes.take import Take
-from glovecal_service.report.error_fall import lineage_fall
 
 
 def test_the_controls_line_is_drawn_at_its_share_of_the_error_before() -> None:
@@ -24,8 +25,8 @@ def test_the_controls_line_is_drawn_at_its_share_of_the_error_before() -> None:
     evidence = {"rmse_before_deg": 2.0, "rmse_control_deg": 1.5, "rmse_after_deg": 0.5}
     child = model_with(replace(added("hysteresis", (5.0,), (0.1,)), evidence=evidence))
     before = compare(base, [take]).overall
-    picture, sentence = lineage_fall([base, child], {}, [take], before)
-    assert f"(control of the last effect: {0.75 * before.rmse_deg:.2f})" in sentence
-    assert "control in the effect" in picture
+    chart = lineage_fall([base, child], {}, [take], before)
+    assert f"(control of the last effect: {0.75 * before.rmse_deg:.2f})" in chart.sentence
+    assert "control in the effect" in svg(chart)
     plain = model_with(added("hysteresis", (5.0,), (0.1,)))
-    assert "control" not in lineage_fall([base, plain], {}, [take], before)[1]
+    assert "control" not in lineage_fall([base, plain], {}, [take], before).sentence

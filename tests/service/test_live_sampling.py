@@ -15,8 +15,7 @@ from glovecal_client.session import open_router
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState
-from glovecal_service.recorder.live_sampling import LiveSampling
-from glovecal_service.recorder.sampling_runner import SamplingRunner
+from glovecal_service.recorder.sampling_runner import LiveSampling, SamplingRunner
 from glovecal_service.store import Store
 
 ENDED = Event()

@@ -19,10 +19,15 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import free_segment, segments
-from glovecal_models.simulation.simulated_glove import Counts, SimulatedGlove, Wearing
-from glovecal_models.simulation.simulated_take import Performance, simulate_take
-from glovecal_service.realtime import live_watch
-from glovecal_service.realtime.live_watch import LOOK_AGAIN_S, WINDOW_S, LiveWatch
+from glovecal_models.simulation.simulated_glove import (
+    Counts,
+    Performance,
+    SimulatedGlove,
+    Wearing,
+    simulate_take,
+)
+from glovecal_service.realtime import glove_lanes
+from glovecal_service.realtime.glove_lanes import LOOK_AGAIN_S, WINDOW_S, LiveWatch
 from glovecal_service.realtime.served_model import ServedModel
 
 LAYOUT = Layout.built_in("cyberglove18")
@@ -102,7 +107,7 @@ def noticed_s(told: list[tuple[float, list[str]]], part: str) -> float:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(live_watch, "time", clock)
+    monkeypatch.setattr(glove_lanes, "time", clock)
     return clock
 
 

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import date
+from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 
+from glovecal_models.calibration.answer import Trained
+from glovecal_models.effect_block import effect_block
+from glovecal_models.effects.base.effect import CorrectionEffect, kind_of
 from glovecal_models.effects.catalogue import catalogue
-from glovecal_service.report import diagnosis_pictures, error_fall
-from glovecal_service.report.caption import Caption
-from glovecal_service.report.diagnosis_page import diagnosis_page
-from glovecal_service.report.drawing import MODEL, svg
-from glovecal_service.report.effects import effect_card
-from glovecal_service.report.error_fall import Fall, FloorBand
-from glovecal_service.report.html import counted_once
-from glovecal_service.report.improvement_page import improvement_page
+from glovecal_models.improvement.answer import EffectAdded, EffectRemoved
+from glovecal_models.improvement.fall.answer import FallStep, FloorBand, fall_chart
+from glovecal_models.presentation.document import Chart
+from glovecal_models.presentation.drawing import MODEL, svg
+from glovecal_models.presentation.html import counted_once, part_html
+from glovecal_service.questions.diagnose import DIAGNOSE
+from glovecal_service.questions.improve import IMPROVE
+from glovecal_service.report.html import page_of
 
 MODEL_ID = "da3a26b60b009b5f723ad22934052eafaf153ce82b8234bd8d25d79c31c7f073"
-CAPTION = Caption(MODEL_ID, "pia", "linear", 2, date(2026, 11, 22))
+TITLE = "pia, version 2 of 22 November 2026"
 VOID = {"meta", "br", "path", "use", "rect", "circle", "image", "link"}
 
 
@@ -83,10 +87,14 @@ def candidate(effect: str, after: float, *, passes: bool) -> dict[str, Any]:
 
 @pytest.fixture
 def diagnosis() -> dict[str, Any]:
-    first = sorted(name for name, item in catalogue().items() if item.has_columns and item.parameters)[0]
-    parameter = catalogue()[first].parameters[0]
+    first = sorted(
+        name
+        for name, item in catalogue().items()
+        if isinstance(item, CorrectionEffect) and item.shape.parameters
+    )[0]
+    parameter = catalogue()[first].shape.parameters[0]
     return {
-        "model": MODEL_ID,
+        "model": MODEL_ID, "title": TITLE, "subject": "pia", "sentences": [],
         "takes": [{"id": "b8fc5a4a2e5a", "name": "w1-t1"}],
         "rotations": {"I_MCP": {"rmse_deg": 3.4, "noise_floor_deg": 0.6}},
         "named": {
@@ -97,8 +105,9 @@ def diagnosis() -> dict[str, Any]:
         "candidates": [candidate(first, 1.2, passes=True), candidate("no_such_effect", 3.7, passes=False)],
         "not_identifiable": [{"effect": "palm <b>", "why": "no sensor"}],
         "findings": [
-            {"sentence": "Take w1-t1: sensor A stands still for 1.5 s."},
-            {"sentence": "Take w1-t2: sensor A stands still for 2.5 s."},
+            {"effect": "sensor_fault", "kind": "stuck", "where": ["A"],
+             "sentence": f"Take w1-t{number}: sensor A stands still for {number}.5 s."}
+            for number in (1, 2)
         ],
         "reference_problems": [],
         "hold_drift": None,
@@ -109,8 +118,14 @@ def diagnosis() -> dict[str, Any]:
                 {"phrase": "c.strap_n", "rotation": "I_MCP", "size_deg": 0.7, "p_value": 0.01, "column": "x"}
             ],
         },
-        "next_take": {"what": "Swing.", "seconds": 25, "separates": ["a", "b"]},
+        "next_take": {
+            "motion": "fast", "what": "Swing.", "seconds": 25, "separates": ["a", "b"], "take_name": "fast",
+        },
     }  # fmt: skip
+
+
+def diagnosis_page(found: dict[str, Any]) -> str:
+    return page_of(DIAGNOSE.read(json.loads(json.dumps(found))).presentation())
 
 
 @pytest.fixture
@@ -126,11 +141,16 @@ def improvement() -> dict[str, Any]:
         "baselines": {"raw": 4.2}, "noise_floor_deg": {"I_MCP": 0.6},
         "noise_floor_interval_deg": {"I_MCP": [0.5, 0.7]}, "stopped": "nothing_named", "undone": [],
         "hold_drift": None, "unexplained_residual": None, "next_take": None, "sentences": ["One.", "Two."],
+        "method": "linear", "subject": "pia", "title": TITLE,
     }  # fmt: skip
 
 
+def improvement_page(found: dict[str, Any]) -> str:
+    return page_of(IMPROVE.read(found).presentation())
+
+
 def test_a_diagnosis_has_a_title_a_summary_and_contents(diagnosis: dict[str, Any]) -> None:
-    page = diagnosis_page(diagnosis, CAPTION)
+    page = diagnosis_page(diagnosis)
     parser = strict(page)
     assert "<h1>Missing effects in pia, version 2 of 22 November 2026 (1 take)</h1>" in page
     head = page[: page.index("<nav")]
@@ -148,17 +168,17 @@ def test_a_diagnosis_has_a_title_a_summary_and_contents(diagnosis: dict[str, Any
 
 
 def test_the_named_effect_is_explained_with_picture_and_parameters(diagnosis: dict[str, Any]) -> None:
-    page = diagnosis_page(diagnosis, CAPTION)
+    page = diagnosis_page(diagnosis)
     known = catalogue()[diagnosis["named"]["effect"]]
     part = page[page.index('<h2 id="the-effect">') : page.index('<h2 id="what-was-tried">')]
     assert "Schematic, not to scale" in part
     assert "<svg" in part
     assert "1.25" in part
-    assert f"{known.parameters[0].name.replace('_', ' ')}, {known.parameters[0].unit}" in part
+    assert f"{known.shape.parameters[0].name.replace('_', ' ')}, {known.shape.parameters[0].unit}" in part
 
 
 def test_an_improvement_tells_each_step_once(improvement: dict[str, Any]) -> None:
-    page = improvement_page(json.loads(json.dumps(improvement)), "linear", "pia", CAPTION)
+    page = improvement_page(json.loads(json.dumps(improvement)))
     strict(page)
     assert "<h1>Improvement of pia, version 2 of 22 November 2026</h1>" in page
     assert "held-out error reduced from 3.60 to 1.40 degrees; noise floor 0.60" in page
@@ -166,17 +186,45 @@ def test_an_improvement_tells_each_step_once(improvement: dict[str, Any]) -> Non
     assert steps.count("<tr>") == 3
 
 
-def test_a_page_without_anything_known_of_the_model_is_a_page() -> None:
-    page = diagnosis_page({"model": MODEL_ID, "takes": []})
+def test_what_made_a_model_has_a_page_too() -> None:
+    added = EffectAdded(
+        "hysteresis", ["I_PIP"], True, "It falls.", {"I_PIP": 2.0}, {"I_PIP": 1.0}, {"I_PIP": {"a_deg": 1.5}},
+        model=MODEL_ID, parent="ab" * 32, title=TITLE,
+    )  # fmt: skip
+    page = page_of(added.presentation())
+    strict(page)
+    assert "<h1>Adding hysteresis to pia, version 2 of 22 November 2026</h1>" in page
+    assert "Not active; glovecal model activate da3a26b60b00 makes it so." in page
+    undone = page_of(replace(added, model=None, added=False).presentation())
+    assert "Model abababababab stays as it is; nothing was stored." in undone
+    removed = EffectRemoved("hysteresis", 1.0, 2.0, parent=MODEL_ID, title=TITLE)
+    strict(page_of(removed.presentation()))
+    assert removed.sentence == (
+        "Without hysteresis the error on takes left out goes from 1.00 to 2.00 degrees."
+    )
+    trained = Trained(
+        MODEL_ID, 3.0, None, {"I_PIP": 3.0, "I_DIP": None}, ["2 takes <b>."], [], [], True, "pia", "linear",
+        "takes",
+    )  # fmt: skip
+    page = page_of(trained.presentation())
+    strict(page)
+    assert "Model da3a26b60b00 (linear) for pia, held-out error 3.00 degrees. Active." in page
+    assert "2 takes &lt;b&gt;." in page
+
+
+def test_a_page_of_nothing_found_is_a_page() -> None:
+    empty = {"rotations": {}, "candidates": [], "not_identifiable": [], "sentences": [], "takes": []}
+    nothing = {"named": None, "unexplained_residual": None, "next_take": None}
+    page = diagnosis_page({"model": MODEL_ID, **empty, **nothing})
     strict(page)
     assert "No known effect beats its control significantly." in page
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))
 def test_every_effect_is_explained_and_drawn(name: str) -> None:
-    card = effect_card(name)
-    assert catalogue()[name].explanation[:20] in card.unescape()
-    assert ("<svg" in card) == (catalogue()[name].kind != "nothing")
+    card = part_html(effect_block(name))
+    assert catalogue()[name].about.explanation[:20] in unescape(card)
+    assert ("<svg" in card) == (kind_of(catalogue()[name]) != "nothing")
 
 
 def curve(name: str, unit: str) -> dict[str, Any]:
@@ -192,7 +240,7 @@ def test_a_learned_form_is_a_picture_for_each_rotation_and_input(improvement: di
     inputs = [curve("M_MCP", "SD"), curve("own", "deg"), curve("humidity_pct", "")]
     lanes = {f"R{place}": {"lowest_deg": -2.0, "highest_deg": place, "inputs": inputs} for place in range(10)}
     added["curves"] = lanes
-    page = improvement_page(improvement, "linear", "pia", CAPTION)
+    page = improvement_page(improvement)
     strict(page)
     card = page[page.index('<h2 id="effects-added">') : page.index('<h2 id="each-rotation">')]
     assert card.count("<svg") == 8 * 3
@@ -212,10 +260,11 @@ def test_associations_have_their_actions_and_claim_no_cause(
 ) -> None:
     action = {"rotation": "I_MCP", "column": "sensor M_MCP", "phrase": "sensor M_MCP", "method": None,
               "effect": "column:M_MCP", "rmse_before_deg": 2.5, "rmse_after_deg": 1.1,
-              "rmse_control_deg": 2.4, "saves": True}  # fmt: skip
+              "rmse_control_deg": 2.4, "saves": True, "is_physical": False,
+              "is_within_known": False}  # fmt: skip
     nothing = {**action, "effect": None, "saves": False, "rotation": "I_PIP"}
     diagnosis["actions"] = [action, nothing, {**nothing, "method": "lmc_gpr"}]
-    page = diagnosis_page(diagnosis, CAPTION)
+    page = diagnosis_page(diagnosis)
     strict(page)
     part = page[page.index('<h2 id="what-to-do-about-it">') : page.index('<h2 id="error-of-each-rotation">')]
     assert f"glovecal add-effect {MODEL_ID[:12]} column:M_MCP --rotation I_MCP" in part
@@ -225,27 +274,22 @@ def test_associations_have_their_actions_and_claim_no_cause(
     assert cells[:6] == ["I_MCP", "sensor M_MCP", "column:M_MCP", "2.50", "1.10", "2.40"]
     assert cells[13] == "-"
     improvement["steps"][1]["added"] |= {"verdict": "associated", "associated_with": "sensor M_MCP"}
-    page = improvement_page(improvement, "linear", "pia", CAPTION)
+    page = improvement_page(improvement)
     assert "associated with sensor M_MCP; no cause is claimed" in page
 
 
-def test_bars_start_at_zero_and_a_fall_over_decades_is_dots(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Figure] = []
-    real = svg
-
-    def kept(draw: Any, width: float, height: float) -> str:
-        figure = Figure()
-        draw(figure.add_subplot())
-        drawn.append(figure)
-        return real(draw, width, height)
-
-    monkeypatch.setattr(error_fall, "svg", kept)
-    monkeypatch.setattr(diagnosis_pictures, "svg", kept)
+def test_bars_start_at_zero_and_a_fall_over_decades_is_dots(diagnosis: dict[str, Any]) -> None:
     band = FloorBand(0.5, 0.4, 0.6)
-    error_fall.error_fall([Fall("raw", 4.0, is_scale=True), Fall("a", 3.0), Fall("+ b", 1.0, 2.9)], band)
-    error_fall.error_fall([Fall("raw", 40.0), Fall("a", 1.0)], band)
-    diagnosis_pictures.errors_beside_floors({"A": {"rmse_deg": 3.0, "noise_floor_deg": 1.0}})
-    linear, wide, errors = (figure.axes[0] for figure in drawn)
+    linear, wide, errors = (Figure().add_subplot() for _ in range(3))
+    small = fall_chart(
+        [FallStep("raw", 4.0, is_scale=True), FallStep("a", 3.0), FallStep("+ b", 1.0, 2.9)], band
+    )
+    large = fall_chart([FallStep("raw", 40.0), FallStep("a", 1.0)], band)
+    *_, bars = (part for part in DIAGNOSE.read(diagnosis).presentation().parts() if isinstance(part, Chart))
+    for chart, axes in ((small, linear), (large, wide), (bars, errors)):
+        assert chart.draw is not None
+        chart.draw(axes)
+    assert errors.get_xlabel() == "smoothed error on held-out takes, degrees"
     assert (linear.get_yscale(), linear.get_ylim()[0]) == ("linear", 0.0)
     assert wide.get_yscale() == "log"
     assert not wide.patches[1:]  # the band only, no bar
@@ -254,7 +298,9 @@ def test_bars_start_at_zero_and_a_fall_over_decades_is_dots(monkeypatch: pytest.
 
 
 def test_pictures_follow_the_page_and_share_no_id() -> None:
-    first, second = (svg(lambda axes, n=n: axes.plot([0, n], marker="o", color=MODEL), 3, 2) for n in (1, 2))
+    first, second = (
+        svg(Chart(lambda axes, n=n: axes.plot([0, n], marker="o", color=MODEL), 3, 2, "")) for n in (1, 2)
+    )
     ids = [set(re.findall(r'id="([^"]+)"', picture)) for picture in (first, second)]
     assert ids[0]
     assert not ids[0] & ids[1]

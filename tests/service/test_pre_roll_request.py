@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from realtime_support import LAYOUT
 
-from glovecal_service.recorder.pre_roll_request import pre_roll_request
+from glovecal_service.recorder.pre_roll import pre_roll_request
 from glovecal_service.store.recordings import with_pre_roll
 from glovecal_service.store.records import GloveRecord, RecordingRecord
 

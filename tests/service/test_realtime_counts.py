@@ -56,7 +56,7 @@ def settled(session: zenoh.Session, settings: Settings, glove: WireGlove) -> dic
 def say_status(session: zenoh.Session, glove: WireGlove, sequence: int) -> None:
     """As the capture daemon: the last number given."""
     status = {"run_id": f"{glove.run_id:016x}", "sequence": sequence, "state": "streaming"}
-    session.put(glove.keys.status, json.dumps(status))
+    session.put(glove.keys.status, json.dumps(status), congestion_control=zenoh.CongestionControl.BLOCK)
 
 
 def lose(glove: WireGlove, frames: int) -> None:

@@ -17,13 +17,11 @@ from realtime_support import LAYOUT, WireGlove, eventually, free_endpoint, part_
 
 from glovecal_client.errors import QueryRefused
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask, ask_json
-from glovecal_client.session import open_client
+from glovecal_client.session import ask, ask_json, open_client
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import Pose, decode_pose
+from glovecal_models.calibration.answer import FrameExplanation
 from glovecal_models.calibration.artifact import dump
-from glovecal_models.calibration.explanation import FrameExplanation
-from glovecal_models.calibration.text import angle_sentences, frame_sentences
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.live_explanations import QUERIES_WAITING, LiveExplanations
 from glovecal_service.serve import real_time
@@ -54,7 +52,7 @@ def explained(by_hand: LoopByHand, glove: str, frames: list[tuple[str, Frame]]) 
 
 
 def assert_is_the_pose(found: FrameExplanation, pose: Pose) -> None:
-    for at, angle in enumerate(found.angles):
+    for at, angle in enumerate(found.rotations):
         assert abs(sum(term.degrees for term in angle.terms) - angle.degrees) < 1e-9
         assert np.float32(angle.degrees) == pose.degrees[at]
         assert np.float32(angle.sd_deg) == pose.deviations[at]
@@ -81,7 +79,7 @@ def test_a_model_without_effects_has_its_base_alone() -> None:
     by_hand.stream(frames[:1])
     found = explained(by_hand, "g1", [("g1", frame) for frame in frames[1:]]).explanation()
     assert_is_the_pose(found, by_hand.poses["g1"][-1])
-    assert [term.name for term in found.angles[0].terms] == ["base", "measurement noise"]
+    assert [term.name for term in found.rotations[0].terms] == ["base", "measurement noise"]
     assert found.transient_s is None
 
 
@@ -90,9 +88,9 @@ def test_what_cannot_be_explained_is_said() -> None:
     by_hand, frames = LoopByHand.serving(MODEL), frames_with_a_fault()
     by_hand.stream(frames[: DROPPED[5]])
     found = explained(by_hand, "g1", [("g1", frames[DROPPED[5]])]).explanation()
-    held = next(angle for angle in found.angles if any(term.kind == "held" for term in angle.terms))
-    assert any(said.startswith("Held:") for said in angle_sentences(held, None))
-    assert [said.split(":")[0] for said in frame_sentences(found)] == ["Transient", "Faulty sensor"]
+    held = next(angle for angle in found.rotations if any(term.kind == "held" for term in angle.terms))
+    assert any(said.startswith("Held:") for said in held.sentences)
+    assert [said.split(":")[0] for said in found.sentences] == ["Transient", "Faulty sensor"]
 
 
 def test_a_frame_that_became_no_pose_is_not_explained() -> None:

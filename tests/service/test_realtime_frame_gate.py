@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_client.wire.frame import Frame, encode_frame
-from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, FrameGate
-from glovecal_service.incoming.refusal import Refusal, RefusalCount, Refused
+from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, FrameGate, Refusal, RefusalCount, Refused
 
 SECOND = 1_000_000_000
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from glovecal_client.plausible_loss import BURST_FRAMES, MOST_FRAMES_PER_S, PlausibleLoss
 from glovecal_client.wire.frame import Frame, encode_frame
-from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, FrameGate
-from glovecal_service.incoming.refusal import Refusal, RefusalCount, Refused
+from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, FrameGate, Refusal, RefusalCount, Refused
 
 SECOND = 1_000_000_000
 LARGEST = 2**64 - 1

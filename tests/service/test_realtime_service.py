@@ -27,13 +27,12 @@ from realtime_support import (
 from glovecal_client.errors import NoAnswer
 from glovecal_client.keys import GloveKeys, all_services
 from glovecal_client.pose_subscriber import PoseSubscriber
-from glovecal_client.queries import ask_json
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, open_client
 from glovecal_client.wire.frame import encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_service.realtime.model_choice import choose
+from glovecal_service.realtime.model_watcher import choose
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.serve import real_time
 from glovecal_service.settings import Settings

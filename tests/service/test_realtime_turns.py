@@ -17,17 +17,21 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
-from glovecal_service.realtime.glove_lane import WAITING_LIMIT, GloveLane
-from glovecal_service.realtime.glove_lanes import VALID_WITHIN_NS, GloveLanes
+from glovecal_service.realtime.glove_lanes import (
+    VALID_WITHIN_NS,
+    WAITING_LIMIT,
+    GlovePipeline,
+    GlovePipelines,
+)
+from glovecal_service.realtime.lane_effects import WornGloves
 from glovecal_service.realtime.pose_loop import PoseLoop
 from glovecal_service.realtime.served_model import Pace, ServedModel, ServedModels
-from glovecal_service.realtime.worn_gloves import WornGloves
 
 MILLISECOND = 1_000_000
 
 
-def lane() -> GloveLane:
-    return GloveLane(GloveKeys("lab", "g1"))
+def lane() -> GlovePipeline:
+    return GlovePipeline(GloveKeys("lab", "g1"))
 
 
 def test_all_waiting_frames_are_taken_when_there_is_room() -> None:
@@ -171,7 +175,7 @@ class NeverEmpty(ByHand):
         ]
 
 
-def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GloveLane]]:
+def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GlovePipeline]]:
     """What a loop did that has 20 ms for a round, and frames of 5 ms each."""
     served = [
         replace(
@@ -236,7 +240,7 @@ def frame_of(sequence: int) -> bytes:
 @given(st.lists(st.tuples(st.integers(0, 9), st.booleans(), st.integers(0, 400)), max_size=120))
 def test_junk_neither_takes_nor_keeps_a_place(arrivals: list[tuple[int, bool, int]]) -> None:
     """A glove whose frame is valid is served, unless as many others sent one within the last second."""
-    lanes, now, valid_at = GloveLanes(limit=3), 10**12, dict[str, int]()
+    lanes, now, valid_at = GlovePipelines(limit=3), 10**12, dict[str, int]()
     for sequence, (glove, valid, after_ms) in enumerate(arrivals):
         now += after_ms * MILLISECOND
         key = GloveKeys("lab", f"g{glove}").raw
@@ -260,7 +264,7 @@ def test_junk_neither_takes_nor_keeps_a_place(arrivals: list[tuple[int, bool, in
 
 
 def test_a_name_that_cannot_be_is_counted_and_told() -> None:
-    lanes = GloveLanes()
+    lanes = GlovePipelines()
     assert lanes.of("glovecal/lab/Bad Name/raw", frame_of(0), 1) is None
     assert lanes.document()["refused_messages"] == {"unusable_name": 1, "no_room": 0}
     assert "Bad Name" in lanes.document()["sentence"]

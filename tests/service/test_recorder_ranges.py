@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_client.wire.frame import Frame, FrameFlag, encode_frame
+from glovecal_service.recorder.run_books import SequenceRanges
 from glovecal_service.recorder.run_ledger import RunLedger
-from glovecal_service.recorder.sequence_ranges import SequenceRanges
 
 numbers = st.lists(st.integers(0, 60), max_size=80)
 

@@ -17,15 +17,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from glovecal_client import Frame, Recording, encode_frame
-from glovecal_client.capture.log_folder import LogFolder
-from glovecal_client.capture.log_queries import LogQueries
+from glovecal_client.capture.log_folder import LogFolder, LogQueries
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
 from glovecal_client.gap_repair import split_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_service.recorder import reconciliation
-from glovecal_service.recorder.capture_log import CaptureRun, CaptureStanding
-from glovecal_service.recorder.reconciliation import Patience, reconcile
-from glovecal_service.recorder.recording_account import Settlement
+from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience, reconcile
+from glovecal_service.recorder.recording_result import Settlement
 from glovecal_service.recorder.run_ledger import BEGIN, RunLedger
 
 MS = 1_000_000

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.store.artifacts import Artifacts
-from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, FolderBlobs, ObjectBlobs
+from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, Artifacts, FolderBlobs, ObjectBlobs
 from glovecal_service.store.errors import NotFound
 
 

@@ -11,6 +11,7 @@ from sqlalchemy import text
 
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.store.errors import Conflict, NotFound, StoreDamaged
+from glovecal_service.store.list_part import ListPart
 
 
 @pytest.fixture
@@ -35,6 +36,22 @@ def test_a_model_comes_back_and_is_found_by_prefix(anna):
     for wrong in (record.id[:5], record.id.upper(), "f" * 64, "../" + record.id, "", "%" * 6, "______"):
         with pytest.raises(NotFound):
             anna.models.get(wrong)
+
+
+def test_models_are_found_by_their_words(anna):
+    monday = add(anna, b"one", name='Monday, 100 % "new"', note="daumen geklebt", effects=["creep"])
+    other = add(anna, b"two", effects=["hysteresis", "creep"])
+    gone = anna.models.remove(add(anna, b"three", name="Monday").id)
+    for words, found in (
+        ("monday", [monday]), ("DAUMEN linear", [monday]), ("100 %", [monday]), ('"new"', [monday]),
+        ("creep", [monday, other]), (other.id[:9], [other]), (other.id[1:9], []), ("linear daumen x", []),
+        ("", [monday, other]), ("_", []), ("\\", []), ("'", []),
+    ):  # fmt: skip
+        part = ListPart(text=words)
+        assert anna.models.list(part=part) == found, words
+        assert anna.models.count(part=part) == len(found)
+    assert anna.models.list(removed=True) == [gone]
+    assert anna.models.list(part=ListPart(limit=1, offset=1, reverse=True)) == [monday]
 
 
 def test_the_same_model_again_is_the_same_record(anna):

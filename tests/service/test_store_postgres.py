@@ -10,6 +10,7 @@ from postgres_server import PostgresServer, find_programs
 
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.store import Store
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import StoreUnavailable
@@ -29,7 +30,7 @@ def own_postgres(postgres):
 
 def test_nothing_acknowledged_is_lost_when_the_server_is_killed(own_postgres, sqlite_settings):
     settings = sqlite_settings.model_copy(update={"database": own_postgres.new_database()})
-    with Store.open(settings) as store, Dispatcher(store, settings):
+    with Store.open(settings) as store, Dispatcher(store, settings, ANSWERED):
         acknowledged, refused, stop = [], [], threading.Event()
 
         def write() -> None:

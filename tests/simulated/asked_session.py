@@ -11,13 +11,11 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.protocol import Protocol, Step
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import OVER, Choose, SamplingState
+from glovecal_models.sampling.state import OVER, Choose, GloveReading, SamplingState
 from glovecal_models.sampling.verdict import TouchCheck
-from glovecal_models.simulation.asked_hand import AskedHand
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS
-from glovecal_models.simulation.touching import RealTouches
+from glovecal_models.simulation.touching import AskedHand, RealTouches
 from glovecal_models.takes.take import Take
 
 RECORDING = "whole"

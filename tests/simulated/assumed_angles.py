@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from glovecal_models.layout import Correspondence, Layout
-from glovecal_models.sampling.active.assumed_process import AssumedProcess, assumed_process, sampled_points
 from glovecal_models.sampling.active.known_readings import KnownReadings
+from glovecal_models.sampling.active.proposal import AssumedProcess, assumed_process, sampled_points
 
 
 def assumed_angles(layout: Layout, known: KnownReadings, readings: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.hand_motion import Unrest, posture_vector
-from glovecal_models.simulation.protocol import Segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
+from glovecal_models.simulation.protocol import Segment, Unrest, posture_vector
+from glovecal_models.simulation.simulated_glove import Performance, SimulatedGlove
 from glovecal_models.simulation.simulated_hand import DRIVEN, POSTURES
-from glovecal_models.simulation.simulated_take import Performance
 from glovecal_models.takes.take import Take
 
 SPEEDS_HZ = (0.31, 0.83)

@@ -13,7 +13,7 @@ from assumed_angles import assumed_angles
 
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import NotTrainable
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.active.known_readings import known_from_takes
 from glovecal_models.sampling.active.next_step import NextStep, candidate_steps
@@ -21,12 +21,10 @@ from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.guided_calibration import guided_calibration
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
 from glovecal_models.sampling.protocol import Protocol
-from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import Choose, NextSteps, SamplingState
+from glovecal_models.sampling.state import Choose, GloveReading, NextSteps, SamplingState
 from glovecal_models.simulation.protocol import evaluation_segment, free_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, SimulatedTake, simulate_take
 
 FULL_S = 252.0
 SHARES = (0.4, 0.5, 0.6, 0.7, 0.8)

@@ -22,7 +22,7 @@ from active_glove import FULL_S, GROWING_WAYS, SHARES, WAYS, ActiveGlove, glove_
 from finished_gloves import FinishedGloves, software_hash
 from intervals import bootstrap
 
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

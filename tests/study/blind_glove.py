@@ -17,8 +17,13 @@ from wandering_reference import WANDER_DEG, with_wander
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
-from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan, TakeMotion
-from glovecal_models.simulation.session_schedule import FULL_BATTERY_V, one_more
+from glovecal_models.simulation.session_plan import (
+    FIVE_SENSORS,
+    FULL_BATTERY_V,
+    SessionPlan,
+    TakeMotion,
+    one_more,
+)
 from glovecal_models.takes.take import Take
 
 PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "T_TMC", "PALM_ARCH")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from blind_glove import BlindGlove, Nuisance
+from simulated_camera import SimulatedCamera, lasting_noise
 
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
@@ -20,13 +21,9 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_camera import SimulatedCamera, lasting_noise
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.takes.camera_reference.camera_clock import camera_clock
-from glovecal_models.takes.camera_reference.camera_reference import reference_from_camera
-from glovecal_models.takes.camera_reference.covered_range import covered_ranges
-from glovecal_models.takes.camera_reference.estimates import CameraEstimates
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
+from glovecal_models.takes.camera_estimates import CameraEstimates, covered_ranges
+from glovecal_models.takes.camera_reference import camera_clock, reference_from_camera
 from glovecal_models.takes.take import Take
 
 MEASURED = SimulatedCamera()

@@ -20,7 +20,7 @@ from camera_gloves import CAMERA_SIZE, TRUE_SIZE, CalibratedGlove, CameraGlove, 
 from intervals import wilson
 
 from glovecal_models.calibration.training_settings import Method
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 GLOVES = {
     "cyberglove": "CyberGlove, fits differently each time",

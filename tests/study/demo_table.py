@@ -21,10 +21,10 @@ from finished_gloves import FinishedGloves, software_hash
 from library_service import LibraryService
 
 from glovecal_client.rest import RestClient
-from glovecal_models.threads import pin_blas_to_one_thread
-from glovecal_service.demo.error_fall import hidden_contract, is_right, told_wrongly
-from glovecal_service.demo.hidden_session import RANDOM_EFFECTS, TAKE_S, hidden_session
-from glovecal_service.demo.second_act import prepare, second_act
+from glovecal_models.diagnosis.answer import MissingEffects
+from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.demo.second_act import hidden_contract, is_right, prepare, second_act, told_wrongly
+from glovecal_service.first_run.hidden_session import RANDOM_EFFECTS, TAKE_S, hidden_session
 
 SEEDS = range(1, 41)
 NAMED = ("none", "unknown", "unknown:posture_locked", *RANDOM_EFFECTS)
@@ -105,13 +105,13 @@ def demo_answer(effect: str, seed: int, take_s: float) -> dict[str, Any]:
     }
 
 
-def _afterwards(diagnosis: Mapping[str, Any]) -> str:
-    if diagnosis["named"] is not None:
-        return f"{diagnosis['named']['effect']} was named"
-    residual = diagnosis["unexplained_residual"]
-    if residual["not_identifiable"]:
+def _afterwards(diagnosis: MissingEffects) -> str:
+    if diagnosis.named is not None:
+        return f"{diagnosis.named.effect} was named"
+    residual = diagnosis.unexplained_residual
+    if residual is None or residual.not_identifiable:
         return "cannot tell whether anything is left"
-    return "something is left" if residual["is_significant"] else "no more left than in healthy gloves"
+    return "something is left" if residual.is_significant else "no more left than in healthy gloves"
 
 
 def summary(found: Sequence[Mapping[str, Any]]) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 from blind_glove import BlindGlove
 
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 
 NOTHING = "nothing"
@@ -18,17 +19,19 @@ def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     What is known by a signature in the recording comes before what is ranked by the error it saves.
     """
     found = diagnose(glove.takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
+    return verdict(found) | {"right": names_of(glove), **glove.told()}
+
+
+def verdict(found: Diagnosis) -> dict[str, Any]:
+    """First name, confidence set and ranking of one diagnosis."""
     signatures = list(dict.fromkeys(item.effect for item in found.signature))
     ranked = [*signatures, *(item.effect for item in found.naming.ranked)]
     if not ranked and found.by_column:
         ranked = [item.effect for item in found.by_column[:1]]
-        signatures = ranked
     return {
         "first": ranked[0] if ranked else NOTHING,
         "confidence_set": [] if found.named is None else list(found.named.confidence_set),
         "ranked": ranked,
-        "right": names_of(glove),
-        **glove.told(),
     }
 
 

@@ -1,10 +1,11 @@
-"""95 % intervals: Wilson's for counts, bootstrap for means and quantiles."""
+"""95 % intervals: Wilson's or exact ones for counts, bootstrap for means and quantiles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import beta
 
 QUANTILE = 1.959964
 RESAMPLES = 2000
@@ -18,6 +19,13 @@ def wilson(count: int, total: int) -> tuple[float, float]:
     middle = (share + spread / 2) / (1 + spread)
     half = QUANTILE * np.sqrt(share * (1 - share) / total + spread / (4 * total)) / (1 + spread)
     return max(float(middle - half), 0.0), min(float(middle + half), 1.0)
+
+
+def clopper_pearson(count: int, total: int) -> tuple[float, float]:
+    """The same, exact (Clopper and Pearson 1934); 0 to 1 when nothing was counted."""
+    low = float(beta.ppf(0.025, count, total - count + 1)) if count else 0.0
+    high = float(beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
+    return low, high
 
 
 def bootstrap(

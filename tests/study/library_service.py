@@ -10,14 +10,16 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
+from glovecal_models.comparison.where.answer import RotationFindings, WhereItFails
 from glovecal_models.diagnosis.model_on_takes import diagnose_model
+from glovecal_models.diagnosis.text import missing_effects
 from glovecal_models.improvement.add_effect import add_effect
+from glovecal_models.improvement.answer import EffectAdded
+from glovecal_models.improvement.text import effect_tried
 from glovecal_models.layout import Layout
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
-from glovecal_service.views.addition import AdditionView
-from glovecal_service.views.comparison import comparison_view
-from glovecal_service.views.diagnosis import DiagnosisView
+from glovecal_service.plain import document_of
 
 
 class LibraryService:
@@ -49,9 +51,10 @@ class LibraryService:
         name, verb = place[1:]
         if verb == "compare":
             found = compare(self._models[name], self._some(asked["takes"]))
-            return comparison_view(found, name, ()).model_dump()
+            return document_of(found)
         if verb == "where":
-            return {"rotations": [{"sentence": "(not asked)"}]}
+            not_asked = RotationFindings("(not asked)", 0.0, 0.0, None, (), None, (), None)
+            return document_of(WhereItFails([not_asked], ()))
         return self._job(self._diagnosed(name) if verb == "diagnose" else self._added(name, asked))
 
     def wait_for_job(self, id: str, **_: Any) -> dict[str, Any]:
@@ -78,8 +81,7 @@ class LibraryService:
         return name
 
     def _diagnosed(self, name: str) -> dict[str, Any]:
-        model = self._models[name]
-        return DiagnosisView.of(diagnose_model(model, self._taught).diagnosis).document()
+        return document_of(missing_effects(diagnose_model(self._models[name], self._taught).diagnosis))
 
     def _added(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
         settings = self._settings[name]
@@ -88,4 +90,4 @@ class LibraryService:
             settings=settings,
         )  # fmt: skip
         child = self._kept(found.model, settings) if found.added else None
-        return AdditionView.of(found).document() | {"model": child}
+        return document_of(EffectAdded(**effect_tried(found), model=child))

@@ -10,13 +10,12 @@ from blind_glove import BlindGlove
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.effects.base.motions import CROSSED, TAPS
+from glovecal_models.diagnosis.residual_answer import NextTake
+from glovecal_models.effects.base.relations import CROSSED, TAPS
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
 from glovecal_models.simulation.session_plan import TakeMotion
 from glovecal_models.simulation.signals import at_times
-from glovecal_models.takes.known_latency import KnownLatency
-from glovecal_models.takes.take import Take
+from glovecal_models.takes.take import KnownLatency, Take
 from glovecal_models.takes.tap_latency import USUAL_KEY_S, usual_key
 
 MOST_TAKES = 2

@@ -15,7 +15,7 @@ from calibration_settings import training_settings
 from ceiling_answer import ceiling_of
 from repair_constants import repair_constants
 
-from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
+from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.prepared_takes import PreparedTakes

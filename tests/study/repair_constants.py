@@ -9,10 +9,10 @@ import numpy as np
 from blind_glove import BlindGlove
 
 from glovecal_models.diagnosis.signatures import own_sensors
-from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.base.effect import SignatureEffect
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
-from glovecal_models.effects.saturation.band_search import saturated_bands
+from glovecal_models.effects.saturation.saturated_band import saturated_bands
 from glovecal_models.takes.take import Take
 
 

@@ -31,7 +31,7 @@ from study_time import estimate, share_of_time
 
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 SET_ASIDE = (
     "use the test generators' set-aside forms instead of the open ones; "

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulated_camera import lasting_noise
 from tracked_errors import TrackedHand, cameras, correlations, table
 
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
-from glovecal_models.simulation.simulated_camera import lasting_noise
 
 
 def known(number: int, *, stays: float, lasts_s: float, times: float) -> TrackedHand:

@@ -15,20 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from simulated_camera import ERRORS, towards_prior
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, HandState
-from glovecal_models.colour_glove.pose.error_learning import ShapeSpread, other_hand, spoilt
+from glovecal_models.colour_glove.photograph import hand_motion
+from glovecal_models.colour_glove.pose.error_learning import ShapeSpread, other_hand, prepared_tracker, spoilt
 from glovecal_models.colour_glove.pose.hand_shape_fit import HandShape, fitted_hand_shape
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, posed
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.simulated_camera import ERRORS, towards_prior
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 RATE_HZ, SECONDS = 30.0, 10.0
 FIRST_SEED = 7000

@@ -8,7 +8,7 @@ from blind_glove import BlindGlove
 from calibration_settings import training_settings
 from diagnosis_answer import diagnosis_answer, names_of
 
-from glovecal_models.calibration.held_out_check import held_out_errors
+from glovecal_models.calibration.leave_out import held_out_errors
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits

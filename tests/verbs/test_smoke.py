@@ -39,7 +39,6 @@ VERBS = (
     "glovecal",
     "test",
     "check",
-    "bench",
     "paper",
     "study",
     "study active",
@@ -129,8 +128,9 @@ def test_check_formats_lints_and_types(smoke) -> None:
     assert "All checks passed" in said.text
 
 
-def test_bench_prints_its_tables(smoke) -> None:
-    said = smoke["bench"].result()
+@pytest.mark.slow
+def test_bench_prints_its_tables() -> None:
+    said = _run("bench", {})
     assert said.number(r"Glovecal, all rotations: ([\d.]+) s on one core") > 0
     assert said.number(r"thumb and index: Glovecal (\d+)") > 100
     assert "== streaming ==" in said.text

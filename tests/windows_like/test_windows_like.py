@@ -21,9 +21,8 @@ import pytest
 
 from glovecal_client.errors import NoAnswer, ServiceError
 from glovecal_client.keys import all_services
-from glovecal_client.queries import ask_json
 from glovecal_client.rest import RestClient
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, open_client
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
 from glovecal_service.demo.processes import demo_place
@@ -141,6 +140,7 @@ def computer(tmp_path: Path) -> Iterator[Computer]:
             os.kill(number, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_the_demo_in_small(computer: Computer) -> None:
     """Capture, recording, import of a reference, training and live poses."""
     said = computer.run("demo", "--smoke")

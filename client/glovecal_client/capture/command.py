@@ -1,4 +1,13 @@
-"""``glovecal-capture``: record and publish a glove. Needs nothing but the client."""
+"""``glovecal-capture``: record and publish a glove, now or at every boot. Needs nothing but the client.
+
+At boot on Linux: the systemd unit of one glove, and the udev rule of its USB adapter.
+
+The unit runs the command it was made by, as a user of its own that exists only while it runs and may use
+serial ports (group dialout) and nothing else. It listens nowhere (SocketBindDeny), except for a glove that
+dials in; it is started at boot and again 2 s after it ends, whatever the reason. What it says is in the
+journal, which systemd bounds; frame logs are bounded by ``--log-limit``.
+(https://www.freedesktop.org/software/systemd/man/latest/systemd.exec.html, systemd.resource-control.html)
+"""
 
 from __future__ import annotations
 
@@ -10,20 +19,18 @@ import textwrap
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn
 
-from glovecal_client.capture.boot import install_unit
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
 from glovecal_client.capture.device import build_device, device_names, device_options
-from glovecal_client.errors import BadOption, ClientError
-from glovecal_client.keys import GloveKeys
-from glovecal_client.names import check_identifier, subject_name
+from glovecal_client.errors import BadOption, CaptureRefused, ClientError
+from glovecal_client.keys import GloveKeys, check_identifier, subject_name
 from glovecal_client.private_files import keep_private
+from glovecal_client.program import never_wait, run_command, say, stopped_by_signals
 from glovecal_client.session import DEFAULT_ENDPOINT
-from glovecal_client.signals import stopped_by_signals
-from glovecal_client.standard_streams import never_wait, run_command, say
 
 UNIT_LOG_LIMIT = 8_000_000_000
 """Bytes that capture at boot keeps, five days at 120 Hz."""
@@ -31,35 +38,25 @@ UNIT_LOG_LIMIT = 8_000_000_000
 
 def run_capture(
     device: str,
-    glove: str,
-    *,
+    settings: CaptureSettings,
     options: Mapping[str, str] | None = None,
-    site: str = "lab",
-    subject: str | None = None,
-    wearing: str | None = None,
-    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,),
-    data: Path | str = "glovecal-data",
-    log_limit: int | None = None,
+    *,
     stop: threading.Event | None = None,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] = lambda sentence: None,
 ) -> CaptureSummary:
-    """Capture until ``stop`` is set, the device has no more to give or the log has half of ``log_limit``.
+    """Capture until ``stop`` is set, the device has no more to give or the log has half of its limit.
 
     ``device`` is ``NAME`` or ``NAME:ARGUMENT``; ``report`` gets sentences as things happen. Subjects are
     written in lower case. Raises BadName, UnknownDevice, BadOption, DeviceError (a device that cannot work at
     all) and CaptureRefused (another publisher, no place to record).
     """
-    report = report or (lambda sentence: None)
+    subject, wearing = settings.subject, settings.wearing
     if subject is not None and (stored := subject_name(subject)) != subject:
         report(f"Subject {subject} is stored as {stored}.")
-        subject = stored
+        settings = replace(settings, subject=stored)
     if wearing is not None:
         check_identifier(wearing, "wearing")
-    settings = CaptureSettings(
-        GloveKeys(site, glove), subject, wearing, tuple(endpoints), Path(data), log_limit
-    )
-    daemon = CaptureDaemon(build_device(device, options), settings, report)
-    return daemon.run(stop or threading.Event())
+    return CaptureDaemon(build_device(device, options), settings, report).run(stop or threading.Event())
 
 
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:
@@ -98,22 +95,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _capture(asked: argparse.Namespace) -> None:
     """One run after another, each ended by the limit of its log; the last by a signal or the device."""
     stop, is_over = threading.Event(), False
+    keys, endpoints = GloveKeys(asked.site, asked.glove), tuple(_endpoints(asked))
+    settings = CaptureSettings(keys, asked.subject, asked.wearing, endpoints, asked.data, asked.log_limit)
     never_wait()
     with stopped_by_signals(stop, outlives_terminal=True):
         while not is_over:
-            summary = run_capture(
-                asked.device,
-                asked.glove,
-                options=parse_options(asked.option),
-                site=asked.site,
-                subject=asked.subject,
-                wearing=asked.wearing,
-                endpoints=_endpoints(asked),
-                data=asked.data,
-                log_limit=asked.log_limit,
-                stop=stop,
-                report=tell,
-            )
+            summary = run_capture(asked.device, settings, parse_options(asked.option), stop=stop, report=tell)
             say(str(summary))
             is_over = not summary.log_is_full or stop.is_set()
 
@@ -198,6 +185,106 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--data", default=os.environ.get("GLOVECAL_DATA", "glovecal-data"), type=Path)
     return parser
+
+
+RULE = """\
+# Glovecal: USB adapters that gloves are known to use (FTDI, WCH, Silicon Labs, Prolific, Arduino, Espressif,
+# Teensy) belong to the group dialout, and ModemManager leaves them alone: what it sends to look for a modem
+# would reach the glove.
+ACTION=="remove", GOTO="glovecal_end"
+SUBSYSTEMS=="usb", ATTRS{idVendor}=="0403|1a86|10c4|067b|2341|2a03|303a|16c0", GOTO="glovecal_adapter"
+GOTO="glovecal_end"
+LABEL="glovecal_adapter"
+ENV{ID_MM_DEVICE_IGNORE}="1"
+SUBSYSTEM=="tty", ENV{ID_MM_PORT_IGNORE}="1", GROUP="dialout", MODE="0660"
+LABEL="glovecal_end"
+"""
+_UNIT = """\
+[Unit]
+Description=Glovecal: capture of glove {glove}
+After=network.target
+StartLimitIntervalSec=0
+
+[Service]
+Type=exec
+ExecStart={command}
+Restart=always
+RestartSec=2
+TimeoutStopSec=20
+DynamicUser=yes
+SupplementaryGroups=dialout
+StateDirectory={name}
+StateDirectoryMode=0700
+UMask=0077
+LogRateLimitIntervalSec=30
+LogRateLimitBurst=300
+ProtectSystem=strict
+ProtectHome=yes
+ProtectKernelTunables=yes
+ProtectKernelModules=yes
+ProtectKernelLogs=yes
+ProtectControlGroups=yes
+ProtectHostname=yes
+PrivateTmp=yes
+NoNewPrivileges=yes
+CapabilityBoundingSet=
+LockPersonality=yes
+RestrictRealtime=yes
+RestrictSUIDSGID=yes
+RestrictNamespaces=yes
+RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
+SystemCallArchitectures=native
+{listening}
+[Install]
+WantedBy=multi-user.target
+"""
+
+
+def install_unit(root: Path, glove: str, arguments: Sequence[str], *, dials_in: bool) -> str:
+    """Write unit and rule below ``root`` (``/`` for this computer); returns what to do next.
+
+    ``arguments`` are those of the capture, without ``--data``. Raises CaptureRefused where the unit could not
+    run (Python or the glove's description in a home folder) or cannot be written.
+    """
+    for path in (sys.prefix, *(word.partition(":")[2] for word in arguments)):
+        if Path(path).is_relative_to("/home") or Path(path).is_relative_to("/root"):
+            raise CaptureRefused(
+                f"capture at boot runs as a user of its own, which cannot read {path}: "
+                "move it to a folder that all users can read, such as /opt/glovecal"
+            )
+    name = f"glovecal-capture-{glove}"
+    unit = root / "etc" / "systemd" / "system" / f"{name}.service"
+    rule = root / "etc" / "udev" / "rules.d" / "60-glovecal.rules"
+    try:
+        for file, text in ((unit, unit_text(name, glove, arguments, dials_in=dials_in)), (rule, RULE)):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+            file.chmod(0o644)
+    except OSError as error:
+        raise CaptureRefused(
+            f"{error.filename} cannot be written ({error.strerror}): run it with sudo, or give a folder"
+        ) from error
+    return (
+        f"Written: {unit} and {rule}. Next:\n"
+        "sudo udevadm control --reload && sudo udevadm trigger\n"
+        f"sudo systemctl daemon-reload && sudo systemctl enable --now {name}\n"
+        f"journalctl -fu {name}"
+    )
+
+
+def unit_text(name: str, glove: str, arguments: Sequence[str], *, dials_in: bool) -> str:
+    """The unit. ``dials_in``: the glove connects to this computer, which must then listen."""
+    program = (sys.executable, "-I", "-m", "glovecal_client.capture.command")
+    command = " ".join(_quoted(word) for word in (*program, *arguments, "--data", f"/var/lib/{name}"))
+    return _UNIT.format(
+        name=name, glove=glove, command=command, listening="" if dials_in else "SocketBindDeny=any\n"
+    )
+
+
+def _quoted(word: str) -> str:
+    """One word of ExecStart: in quotes, with nothing that systemd would expand."""
+    plain = word.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("$", "$$")
+    return f'"{plain}"' if not word or set(word) & set(" \t'\"\\;") else plain
 
 
 if __name__ == "__main__":

@@ -1,37 +1,183 @@
 """The capture daemon: device to log to wire, in that order, until it is told to stop.
 
-A frame gets its sequence number, is appended to the local log, and only then published; whoever missed it
-can ask the log. Each start is a new run with a random run id and sequence numbers from 0.
+A reading that is fit to become a frame gets its sequence number, is appended to the local log, and only then
+published; whoever missed it can ask the log. Each start is a new run with a random run id and sequence
+numbers from 0.
+
+A glove can be asked beside its stream, on ``glovecal/<site>/<glove>/control?do=NAME;with=ARGUMENT``, such as
+"record on your card". That is carried out between two readings; the reply is the device's document.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import queue
 import secrets
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.capture.computer import computer_id
-from glovecal_client.capture.device import Device, Reading, check_description
-from glovecal_client.capture.glove_commands import GloveCommands
+import numpy as np
+import zenoh
+
+from glovecal_client.capture.device import Device, Reading, ReopeningDevice, check_description
 from glovecal_client.capture.link import CaptureLink, LinkSources
-from glovecal_client.capture.log_folder import LogFolder
-from glovecal_client.capture.log_queries import LogQueries
-from glovecal_client.capture.reading_check import ReadingCheck
-from glovecal_client.capture.reopening_device import ReopeningDevice
+from glovecal_client.capture.log_folder import LogFolder, LogQueries
 from glovecal_client.capture.status import CaptureState, CaptureStatus
-from glovecal_client.clock import wall_ns
-from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost
+from glovecal_client.clock import clock_ns, computer_id, wall_ns
+from glovecal_client.errors import ClientError, DeviceError, DeviceFinished, DeviceLost, reason_of
 from glovecal_client.frame_log import BackgroundSync
-from glovecal_client.keys import GloveKeys
-from glovecal_client.session import DEFAULT_ENDPOINT
+from glovecal_client.keys import JSON_ENCODING, GloveKeys, did_you_mean
+from glovecal_client.session import DEFAULT_ENDPOINT, REFUSAL_ENCODING
 from glovecal_client.wire.frame import Frame, FrameFlag, encode_frame
+
+MOST_WAITING = 8
+
+
+class GloveCommands:
+    """Taken by zenoh's threads, carried out by the capture thread: one device, one thread."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._queue: queue.Queue[zenoh.Query] = queue.Queue(MOST_WAITING)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether ``carry_out`` has something to do."""
+        return not self._queue.empty()
+
+    def take(self, query: zenoh.Query) -> None:
+        """Let a command wait; refused at once when too many do or the glove has none."""
+        commands = getattr(self._device, "commands", {})
+        name = str(query.parameters.get("do", ""))
+        if not commands:
+            _refuse(query, f"{self._device.name} is only listened to: it has no commands")
+        elif name not in commands:
+            meant = did_you_mean(name, commands)
+            _refuse(query, f"{self._device.name} has no command {name!r}; {meant}")
+        else:
+            try:
+                self._queue.put_nowait(query)
+            except queue.Full:
+                _refuse(query, f"{MOST_WAITING} commands wait already; ask again")
+
+    def carry_out(self, *, is_open: bool) -> None:
+        """The oldest one. Raises DeviceLost when the glove is lost meanwhile."""
+        query = self._queue.get_nowait()
+        if not is_open:
+            _refuse(query, f"{self._device.name} is not open: plug it in")
+            return
+        do: Callable[[str, str], Mapping[str, Any]] = self._device.command  # type: ignore[attr-defined]
+        try:
+            answer = do(str(query.parameters.get("do", "")), str(query.parameters.get("with", "")))
+        except Exception as error:  # a device is foreign code, perhaps a user's own
+            is_ours = isinstance(error, ClientError)
+            _refuse(query, reason_of(error) if is_ours else f"{self._device.name}: {reason_of(error)}")
+            if isinstance(error, DeviceLost):
+                raise
+            return
+        with query:
+            query.reply(query.key_expr, json.dumps(dict(answer)), encoding=JSON_ENCODING)
+
+    def close(self) -> None:
+        """Answer what waits still."""
+        while self.waiting:
+            _refuse(self._queue.get_nowait(), "capture has stopped")
+
+
+def _refuse(query: zenoh.Query, sentence: str) -> None:
+    with query:
+        query.reply_err(sentence, encoding=REFUSAL_ENCODING)
+
+
+_MAX_AHEAD_NS = 1_000_000_000
+
+
+class ReadingCheck:
+    """Refuses readings that are not what the device said it produces, and tells why."""
+
+    def __init__(self, device: Device) -> None:
+        self._sensors = tuple(device.sensors)
+        self._context = tuple(device.context)
+        self._counts: tuple[float, float] | None = getattr(device, "counts", None)
+        self._last_ns: int | None = None
+
+    def is_duplicate(self, reading: Reading) -> bool:
+        """Whether it was taken at the same nanosecond as the one before: the same reading given twice."""
+        return self._last_ns is not None and reading.monotonic_ns == self._last_ns
+
+    def fault(self, reading: Reading) -> str | None:
+        """A sentence saying what is wrong, None if nothing is; the next must then be later than this."""
+        fault = self._values_fault(reading) or self._time_fault(reading)
+        if fault is None:
+            self._last_ns = reading.monotonic_ns
+        return fault
+
+    def _values_fault(self, reading: Reading) -> str | None:
+        try:
+            readings, context = _as_sent(reading.readings), _as_sent(reading.context)
+        except (TypeError, ValueError):
+            return "its values are no numbers"
+        if readings.shape != (len(self._sensors),):
+            return f"{_size(readings)} sensor values instead of {len(self._sensors)}"
+        if context.shape != (len(self._context),):
+            return f"{_size(context)} context values instead of {len(self._context)}"
+        if len(context) and np.isinf(context).any():
+            return f"context {self._context[int(np.argmax(np.isinf(context)))]} is infinite"
+        if self._is_within_counts(readings):
+            return None
+        bad = ~np.isfinite(readings)
+        if bad.any():
+            column = int(np.argmax(bad))
+            return f"sensor {self._sensors[column]} reads {readings[column]}"
+        return self._counts_fault(readings)
+
+    def _is_within_counts(self, readings: np.ndarray) -> bool:
+        """The usual case, told by two numbers: NaN and infinity are in no range."""
+        if self._counts is None or not len(readings):
+            return False
+        return bool(self._counts[0] <= np.minimum.reduce(readings)) and bool(
+            np.maximum.reduce(readings) <= self._counts[1]
+        )
+
+    def _counts_fault(self, readings: np.ndarray) -> str | None:
+        if self._counts is None:
+            return None
+        low, high = self._counts
+        outside = (readings < low) | (readings > high)
+        if not outside.any():
+            return None
+        column = int(np.argmax(outside))
+        return f"sensor {self._sensors[column]} reads {readings[column]:g}, outside {low:g} to {high:g}"
+
+    def _time_fault(self, reading: Reading) -> str | None:
+        for stamp in (reading.monotonic_ns, reading.wall_ns):
+            if not isinstance(stamp, int) or not -(1 << 63) <= stamp < 1 << 63:
+                return f"its time {stamp!r} is not a whole number of nanoseconds"
+        if self._last_ns is not None and reading.monotonic_ns < self._last_ns:
+            return f"its time is {(self._last_ns - reading.monotonic_ns) / 1e6:g} ms before the one before it"
+        ahead_ns = reading.monotonic_ns - clock_ns()
+        if ahead_ns > _MAX_AHEAD_NS:
+            return f"its time is {ahead_ns / 1e9:g} s in the future"
+        return None
+
+
+def _as_sent(values: np.ndarray) -> np.ndarray:
+    """As float32, which is what a frame holds; what is too large for it becomes infinite."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float32:
+        return values
+    with np.errstate(over="ignore"):
+        return np.asarray(values, dtype=np.float32)
+
+
+def _size(values: np.ndarray) -> str:
+    return str(len(values)) if values.ndim == 1 else f"an array of shape {values.shape} with"
+
 
 _READ_TIMEOUT_S = 0.1
 _STATUS_PERIOD_S = 1.0

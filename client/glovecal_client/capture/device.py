@@ -1,8 +1,13 @@
-"""What a capture device is, and where devices are found (entry-point group ``glovecal.devices``)."""
+"""What a capture device is, and where devices are found (entry-point group ``glovecal.devices``).
+
+One that was lost is opened again by itself, with growing pauses, holding nothing else up.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -10,9 +15,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from glovecal_client.errors import BadName, BadOption, DeviceError, UnknownDevice
+from glovecal_client.errors import BadName, BadOption, DeviceError, DeviceLost, UnknownDevice, reason_of
 from glovecal_client.installation import not_installed
-from glovecal_client.names import check_channel_name, did_you_mean
+from glovecal_client.keys import check_channel_name, did_you_mean
 from glovecal_client.wire.frame import MAX_CONTEXT, MAX_SENSORS
 
 DEVICE_GROUP = "glovecal.devices"
@@ -45,9 +50,11 @@ class Device(Protocol):
     raw value its hardware can send; ``hand``, one of ``left``, ``right``, ``unknown``; ``counters`` with
     ``bad_frames``, the records thrown away since they came damaged, and perhaps ``last_refused``, the last of
     them and why; ``notice``, a sentence for the user;
-    ``option_help`` of the class, what each option may be, by the option's name; ``own_clock``, a document on
-    how the glove's clock stands against the computer's; ``commands``, what it can be asked beside its stream,
-    with an explanation each, and ``command(name, argument)``, which does it and returns a document.
+    ``option_help`` of the class, what each option may be, by the option's name; ``about`` of the class, a
+    sentence that tells which glove it reads, and ``usage``, what stands behind ``--device`` for it, with PORT
+    or FILE for what differs; ``own_clock``, how the glove's clock stands against the computer's;
+    ``commands``, what it can be asked beside its stream, with an explanation each, and ``command(name,
+    argument)``, which does it and returns a document.
     """
 
     @property
@@ -129,6 +136,31 @@ def check_options(device: str, given: Mapping[str, str], option_help: Mapping[st
         raise BadOption(f"{device}: no option {unknown[0]!r}; there are {_listed(option_help)}")
 
 
+@dataclass(frozen=True)
+class InstalledDevice:
+    """What a list of devices tells of one."""
+
+    name: str
+    usage: str
+    """Behind ``--device``; PORT and FILE stand for what differs."""
+    about: str
+    """A sentence; of one that cannot be used here, why."""
+
+
+def installed_devices() -> list[InstalledDevice]:
+    """By name, also those of a user's own."""
+    return [_described(name) for name in device_names()]
+
+
+def _described(name: str) -> InstalledDevice:
+    try:
+        device = _device_class(name)
+    except DeviceError as error:
+        return InstalledDevice(name, name, str(error))
+    about = getattr(device, "about", "A driver that was installed on this computer.")
+    return InstalledDevice(name, str(getattr(device, "usage", name)), str(about))
+
+
 def device_options() -> list[str]:
     """One sentence for each installed device: its options and what they may be."""
     sentences = []
@@ -162,3 +194,58 @@ def _device_class(name: str) -> type[Device]:
                 raise DeviceError(not_installed(f"device {name!r}", error.name or point.module)) from error
     known = device_names()
     raise UnknownDevice(f"no device {name!r}; {did_you_mean(name, known, there='installed are')}")
+
+
+_FIRST_PAUSE_S = 0.1
+_LONGEST_PAUSE_S = 1.0
+"""A glove that is plugged in again is back within 2 s: this pause, and opening it."""
+
+
+class ReopeningDevice:
+    """Reads a device, opening it when that is due. Pauses between tries double from 0.1 s to 1 s."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._pause_s = _FIRST_PAUSE_S
+        self._next_try = 0.0
+        self.is_open = False
+        self.openings: int = 0
+        """How often it was opened."""
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """The next reading, or None. Raises DeviceLost once per loss or failed try, other DeviceErrors too.
+
+        A device is foreign code, perhaps a user's own: any other exception of it counts as a loss.
+        """
+        if not self.is_open:
+            remaining = self._next_try - time.monotonic()
+            if remaining > 0:
+                time.sleep(min(remaining, timeout_s))
+                return None
+        try:
+            if not self.is_open:
+                self._open()
+            return self._device.read(timeout_s)
+        except Exception as error:
+            self._put_off()
+            if isinstance(error, DeviceError):
+                raise
+            raise DeviceLost(f"{self._device.name}: {reason_of(error)}") from error
+
+    def _open(self) -> None:
+        self._device.open()
+        self.is_open = True
+        self.openings += 1
+
+    def _put_off(self) -> None:
+        if self.is_open:
+            self._pause_s = _FIRST_PAUSE_S
+        self.close()
+        self._next_try = time.monotonic() + self._pause_s
+        self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
+
+    def close(self) -> None:
+        """Close the device; one that is gone may complain, which tells nothing new."""
+        self.is_open: bool = False
+        with contextlib.suppress(Exception):
+            self._device.close()

@@ -1,19 +1,27 @@
-"""The capture logs of one glove: ``DATA/capture/<site>/<glove>/<start>-<run>.glvlog``, one file a run."""
+"""The capture logs of one glove: ``DATA/capture/<site>/<glove>/<start>-<run>.glvlog``, one file a run.
+
+Frames of a run are found by sequence number while its log is still growing, and sent to whoever asks for them
+(``?run=HEX16;from=A;to=B``).
+"""
 
 from __future__ import annotations
 
+import bisect
+import re
+import struct
+import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.errors import CaptureRefused, DamagedLog, reason_of
-from glovecal_client.frame_log import FrameLog
+from glovecal_client.errors import BadName, CaptureRefused, DamagedLog, reason_of
+from glovecal_client.frame_log import FrameLog, Recording, cut_damaged_tail, scan_records
 from glovecal_client.keys import GloveKeys
-from glovecal_client.log_records import Recording, cut_damaged_tail
 from glovecal_client.operating_system import lock_file
 from glovecal_client.private_files import make_private
+from glovecal_client.wire.frame import frame_sequence
 
 SUFFIX = ".glvlog"
 EARLIER_RUNS = 16
@@ -103,3 +111,96 @@ class LogFolder:
     def find(self, run_id: int) -> Path | None:
         """The log of a run, None if there is none."""
         return next(iter(self.path.glob(f"*-{run_id:016x}{SUFFIX}")), None)
+
+
+_EVERY = 64
+"""One entry for so many records: 8 hours at 120 Hz need less than 1 MB."""
+
+
+class LogIndex:
+    """A sparse index of a log whose frames have increasing sequence numbers. Safe for several threads."""
+
+    def __init__(self, path: Path) -> None:
+        self._recording = Recording.open(path)
+        self._lock = threading.Lock()
+        self._sequences: list[int] = []
+        self._offsets: list[int] = []
+        self._records = 0
+        self._end = self._recording.first_record
+        self.first: int | None = None
+        """Lowest sequence number in the log, None while it is empty."""
+        self.last: int | None = None
+        """Highest sequence number in the log as of the last ``extend``."""
+
+    def extend(self) -> None:
+        """Take in the records written since the last call. Raises OSError."""
+        with self._lock, self._recording.path.open("rb") as file:
+            start = self._end
+            for end, payload in scan_records(file, self._end):
+                self._add(frame_sequence(payload), start)
+                start = self._end = end
+
+    def _add(self, sequence: int, offset: int) -> None:
+        if self._records % _EVERY == 0:
+            self._sequences.append(sequence)
+            self._offsets.append(offset)
+        self._records += 1
+        self.last = sequence
+        if self.first is None:
+            self.first = sequence
+
+    def payloads(self, first: int, last: int, *, max_count: int, max_bytes: int) -> list[bytes]:
+        """Frames with sequence ``first`` to ``last``, both included, up to the bounds, in order."""
+        self.extend()
+        with self._lock:
+            entry = bisect.bisect_right(self._sequences, first) - 1
+            offset = self._offsets[entry] if entry >= 0 else self._recording.first_record
+        found: list[bytes] = []
+        total = 0
+        with self._recording.path.open("rb") as file:
+            for _, payload in scan_records(file, offset):
+                sequence = frame_sequence(payload)
+                total += len(payload) if sequence >= first else 0
+                if sequence > last or len(found) >= max_count or total > max_bytes:
+                    break
+                if sequence >= first:
+                    found.append(payload)
+        return found
+
+
+MAX_REPLY_FRAMES = 4096
+MAX_REPLY_BYTES = 4 << 20
+_QUESTION = re.compile(r"run=([0-9a-f]{16});from=([0-9]{1,20});to=([0-9]{1,20})\Z")
+_LENGTH = struct.Struct("<I")
+
+
+class LogQueries:
+    """Looks frames up in the logs of one glove, those of the running and of earlier runs."""
+
+    def __init__(self, folder: LogFolder) -> None:
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._indexes: dict[int, LogIndex] = {}
+
+    def index(self, run_id: int) -> LogIndex:
+        """The index of a run's log. Raises BadName for a run that was not recorded here."""
+        with self._lock:
+            if run_id not in self._indexes:
+                path = self._folder.find(run_id)
+                if path is None:
+                    raise BadName(f"run {run_id:016x} was not recorded here")
+                self._indexes[run_id] = LogIndex(path)
+            return self._indexes[run_id]
+
+    def answer(self, parameters: str) -> bytes:
+        """The reply's payload: each frame as u32 length and bytes. Raises BadName, WireError, DamagedLog."""
+        asked = _QUESTION.match(parameters)
+        if not asked:
+            raise BadName(f"log query {parameters[:80]!r} is not run=HEX16;from=A;to=B")
+        first, last = int(asked[2]), int(asked[3])
+        if first > last:
+            raise BadName(f"log query: from={first} is after to={last}")
+        found = self.index(int(asked[1], 16)).payloads(
+            first, last, max_count=MAX_REPLY_FRAMES, max_bytes=MAX_REPLY_BYTES
+        )
+        return b"".join(_LENGTH.pack(len(payload)) + payload for payload in found)

@@ -1,20 +1,28 @@
-"""A video beside a take: pictures of a source to disk, in a thread of its own, until it is stopped."""
+"""A video beside a take: pictures of a source to disk, in a thread of its own, until it is stopped.
+
+``python -m glovecal_client.pictures.recording SOURCE FILE.mkv`` is the same as a process of its own: a
+camera's driver may hang or crash, and then only this does. It films until its standard input ends, which is
+also when the program that started it dies, and leaves ``FILE.json`` beside the video.
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 import threading
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from glovecal_client.capture.computer import computer_id
+from glovecal_client.clock import computer_id
 from glovecal_client.errors import ClientError, reason_of
-from glovecal_client.pictures.source import PictureSource
+from glovecal_client.pictures.source import PictureSource, build_source
 from glovecal_client.pictures.video_file import VideoWriter
+from glovecal_client.program import leave_signals_to_the_parent, run_command
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # the client runs on Python 3.10
+
 
 STOPS_WITHIN_S = 10.0
 NOT_ENDED = "the recording was not ended; its pictures up to then are there"
@@ -84,3 +92,20 @@ def describe_video(video: Path, source: PictureSource, pictures: int, problem: s
     }  # fmt: skip
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return path
+
+
+def main(source: str, file: str) -> int:
+    """0, or 1 with a sentence on standard error when there is no camera or no place."""
+    leave_signals_to_the_parent()
+    try:
+        with VideoRecording(build_source(source), Path(file)) as video:
+            sys.stdin.buffer.read()
+        video.describe()
+    except (ClientError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(lambda: main(*sys.argv[1:]))

@@ -10,7 +10,7 @@ from enum import IntFlag
 import numpy as np
 
 from glovecal_client.errors import WireError
-from glovecal_client.wire.checksum import CHECKSUM_BYTES, check_seal, sealed
+from glovecal_client.wire.frame import CHECKSUM_BYTES, check_seal, sealed
 
 POSE_ENCODING = "application/octet-stream;glovecal.pose.v1"
 MAX_ROTATIONS = 1024

@@ -1,4 +1,7 @@
-"""An effect of a calibration model: on which rotations, in which form, with which shape and weights."""
+"""An effect of a calibration model: on which rotations, in which form, with which shape and weights.
+
+An effect that a calibration is asked to have, and where.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, Stream
-from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.effect import (
+    CorrectionEffect,
+    Effect,
+    FormSignals,
+    IntervalEffect,
+    RepairEffect,
+    Stream,
+    described,
+)
+from glovecal_models.effects.base.facts import WeightsOfWearings
 from glovecal_models.effects.base.form_curve import LaneCurves
-from glovecal_models.effects.base.interval_effect import IntervalEffect
 from glovecal_models.effects.base.learned_form import OWN, LearnedForm
-from glovecal_models.effects.base.signals import GloveFrames, Signals
-from glovecal_models.effects.catalogue import stored_effect
+from glovecal_models.effects.base.signals import GloveFrames, Settings, Signals
+from glovecal_models.effects.catalogue import stored_correction, stored_effect
 from glovecal_models.errors import BadInput
 
 FORM = "form"
@@ -71,6 +81,17 @@ class AddedEffect:
         """From the catalogue. Raises BadInput when this machine does not have it."""
         return stored_effect(self.name, self.settings)
 
+    @property
+    def correction(self) -> CorrectionEffect:
+        """The same, of an effect with columns. Raises BadInput as above, and for any other."""
+        return stored_correction(self.name, self.settings)
+
+    @property
+    def of_wearings(self) -> WeightsOfWearings | None:
+        """What its weights tell of single wearings; None where they are the same in all. Raises BadInput."""
+        effect = self.effect
+        return effect.weights(self.settings).of_wearings if isinstance(effect, CorrectionEffect) else None
+
     @cached_property
     def form(self) -> LearnedForm | None:
         """What was learned of how its inputs act, beyond its own columns. Raises BadInput."""
@@ -97,14 +118,24 @@ class AddedEffect:
             name for name, weights in zip(self.rotations, self.weights, strict=True) if np.any(weights)
         )
 
+    @property
+    def transient_s(self) -> float:
+        """How long a state started anew still shows, seconds; 0 without a memory."""
+        effect = self.effect
+        if not isinstance(effect, CorrectionEffect):
+            return 0.0
+        return effect.dynamics.transient_s(self.shape[self.weights.any(axis=1)], self.settings)
+
     def described(self) -> dict[str, dict[str, float]]:
         """For each rotation the learned numbers, units in their names."""
         effect = self.effect
         if isinstance(effect, IntervalEffect):
             return {name: effect.described_on(self.settings, name) for name in self.rotations}
+        if not isinstance(effect, CorrectionEffect):
+            return {name: {} for name in self.rotations}
         own = self.own_count
         return {
-            name: self._with_curves(name, effect.described(self.settings, shape, weights[:own]))
+            name: self._with_curves(name, described(effect, self.settings, shape, weights[:own]))
             for name, shape, weights in zip(self.rotations, self.shape, self.weights, strict=True)
             if name in self.active
         }
@@ -113,17 +144,17 @@ class AddedEffect:
         """The shape's numbers, those of the form's curves, then the weights."""
         if rotation not in self.curves:
             return dict(numbers)
-        each, first = list(numbers.items()), len(self.effect.parameters)
+        each, first = list(numbers.items()), len(self.effect.shape.parameters)
         return {**dict(each[:first]), **self.curves[rotation].described(), **dict(each[first:])}
 
     def columns_of_takes(self, takes: Sequence[Signals]) -> list[np.ndarray]:
         """(N, L, C) of each take whose lanes are this effect's: what the weights are multiplied with."""
-        found = self.effect.columns_of_takes(takes, self.settings, self.shape)
+        effect = self.correction
+        found = effect.dynamics.columns_of_takes(takes, self.settings, self.shape)
         if self.form is None:
             return found
         inputs = [
-            form_values(self.effect, take, part, self.settings)
-            for take, part in zip(takes, found, strict=True)
+            form_values(effect, take, part, self.settings) for take, part in zip(takes, found, strict=True)
         ]
         return [
             np.concatenate([part, self.form.columns(values)], axis=2)
@@ -132,20 +163,19 @@ class AddedEffect:
 
     def corrections(self, takes: Sequence[Signals]) -> list[np.ndarray]:
         """(N, L), degrees, of each take whose lanes are this effect's."""
-        found = self.effect.columns_of_takes(takes, self.settings, self.shape)
+        found = self.correction.dynamics.columns_of_takes(takes, self.settings, self.shape)
         return [self._contribution(take, part, None).degrees for take, part in zip(takes, found, strict=True)]
 
     def contribution(self, take: Signals) -> Contribution:
         """To every frame of a take whose lanes are this effect's."""
-        plain = self.effect.columns(take, self.settings, self.shape)
+        plain = self.correction.columns(take, self.settings, self.shape)
         return self._contribution(take, plain, self.variance_factor)
 
     def _contribution(self, take: Signals, plain: np.ndarray, factor: np.ndarray | None) -> Contribution:
         """Of the effect's own columns ``plain`` (N, L, C); without ``factor`` no variance."""
-        effect = self.effect
         if self.form is None and factor is None:
             return Contribution(np.einsum("nlc,lc->nl", plain, self.weights), None)
-        inputs = form_values(effect, take, plain, self.settings) if self.form else {}
+        inputs = form_values(self.correction, take, plain, self.settings) if self.form else {}
         degrees = np.empty(plain.shape[:2])
         variance = None if factor is None else np.empty(plain.shape[:2])
         for first in range(0, len(take), FORM_FRAMES_AT_ONCE):
@@ -162,15 +192,18 @@ class AddedEffect:
     @cached_property
     def variance_factor(self) -> np.ndarray | None:
         """(L, C, C): the covariance of the weights is this times its transpose. None where it is not held."""
-        if self.covariance is None or not self.covariance.size or self.effect.tells_own_uncertainty:
+        if self.covariance is None or not self.covariance.size:
             return None
+        if self.of_wearings is not None:
+            return None  # they tell all that is unknown of them
         values, vectors = np.linalg.eigh(self.covariance)
         return vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
 
     def stream(self) -> Stream:
         """All its columns, frame by frame."""
-        inner = self.effect.stream(self.settings, self.shape)
-        return inner if self.form is None else _FormedStream(self.effect, self.form, inner, self.settings)
+        effect = self.correction
+        inner = effect.dynamics.stream(self.settings, self.shape)
+        return inner if self.form is None else _FormedStream(effect, self.form, inner, self.settings)
 
 
 def weight_variance(columns: np.ndarray, factor: np.ndarray) -> np.ndarray:
@@ -180,17 +213,19 @@ def weight_variance(columns: np.ndarray, factor: np.ndarray) -> np.ndarray:
 
 
 def form_values(
-    effect: Effect, take: Signals, columns: np.ndarray, settings: Settings
-) -> dict[str, np.ndarray]:
+    effect: CorrectionEffect, take: Signals, columns: np.ndarray, settings: Settings
+) -> FormSignals:
     """(N, L) of every input of a learned form by name; empty for an effect that has none."""
-    inputs = effect.form_inputs(take, columns, settings)
-    return {OWN: take.own, **inputs} if inputs else {}
+    found = effect.form_inputs(take, columns, settings)
+    return FormSignals({OWN: take.own, **found}, found.unit, found.take_sd_deg) if found else found
 
 
 class _FormedStream(Stream):
     """An effect's columns and those of its learned form."""
 
-    def __init__(self, effect: Effect, form: LearnedForm, inner: Stream, settings: Settings) -> None:
+    def __init__(
+        self, effect: CorrectionEffect, form: LearnedForm, inner: Stream, settings: Settings
+    ) -> None:
         self._effect, self._form, self._inner, self._settings = effect, form, inner, settings
 
     @property
@@ -216,3 +251,51 @@ class _FormedStream(Stream):
             return streams[0]._with_form(signals, plain)
         each = zip(streams, frames, plain, strict=True)
         return np.concatenate([stream._with_form(frame, part[None]) for stream, frame, part in each])
+
+
+@dataclass(frozen=True)
+class EffectRequest:
+    """An effect and the rotations it is on."""
+
+    effect: Effect
+    rotations: tuple[str, ...]
+    settings: Settings = field(default_factory=dict)
+    """What is known already: the clocks' offsets."""
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    @property
+    def has_columns(self) -> bool:
+        """It corrects the prediction; the others repair the measurement or widen the interval."""
+        return isinstance(self.effect, CorrectionEffect)
+
+    @property
+    def correction(self) -> CorrectionEffect:
+        """The effect, where it has columns."""
+        assert isinstance(self.effect, CorrectionEffect), f"{self.name} has no columns"
+        return self.effect
+
+    @property
+    def is_on_reference(self) -> bool:
+        """It repairs the measurement; nothing is predicted."""
+        return isinstance(self.effect, RepairEffect)
+
+
+def columnless_effects(
+    wanted: Sequence[EffectRequest], before: Sequence[AddedEffect] = ()
+) -> list[AddedEffect]:
+    """The effects among ``wanted`` that have settings only: repairs of the measurement, wider intervals.
+
+    Those there were ``before`` keep their evidence.
+    """
+    evidence = {item.name: item.evidence for item in before}
+    found = []
+    for item in wanted:
+        if not item.has_columns:
+            nothing = np.zeros((len(item.rotations), 0))
+            zero = np.zeros(len(item.rotations))
+            known = evidence.get(item.name, {})
+            found.append(AddedEffect(item.name, item.rotations, item.settings, nothing, nothing, zero, known))
+    return found

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, weight_variance
-from glovecal_models.calibration.correction_parts import CorrectionParts
-from glovecal_models.calibration.interval_inflation import IntervalInflation, VarianceInflation
+from glovecal_models.calibration.correction_parts import CorrectionParts, IntervalInflation, VarianceInflation
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
-from glovecal_models.effects.base.effect import Effect, Stream, Uncertainty
+from glovecal_models.effects.base.effect import CorrectionEffect, RepairEffect, Stream, unavailable_inputs
+from glovecal_models.effects.base.facts import Uncertainty
+from glovecal_models.effects.base.findings import Hold
 from glovecal_models.effects.base.signals import GloveFrames, Signals
-from glovecal_models.effects.base.signature_effect import Hold, SignatureEffect
 from glovecal_models.errors import BadInput, reason_of
 
 LARGEST_CORRECTION_DEG = 360.0
@@ -110,13 +110,7 @@ class EffectCorrection:
             dict.fromkeys(name for effect in self._effects for name in effect.context)
         )
         """Context columns that the effects read."""
-        self.settling_s: float = max(
-            (
-                effect.transient_s(item.shape[item.weights.any(axis=1)], item.settings)
-                for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
-            ),
-            default=0.0,
-        )
+        self.settling_s: float = max((item.transient_s for item, _ in self._lanes), default=0.0)
         """So long after a start the state still shows that it was started anew; 0: nothing is remembered."""
 
     @property
@@ -144,9 +138,8 @@ class EffectCorrection:
     @property
     def needing_time(self) -> tuple[str, ...]:
         """Names of the effects whose columns depend on when the frames were."""
-        effects = (*self._effects, *self._intervals.effects)
-        names = tuple(effect.name for effect in effects if effect.needs_time)
-        return (*names, *(name for name, _ in self._holds))
+        names = tuple(effect.name for effect in self._effects if effect.dynamics.needs_time)
+        return (*names, *self._intervals.needing_time, *(name for name, _ in self._holds))
 
     def silent(self, context: Collection[str], wearing: str) -> tuple[str, ...]:
         """A sentence for each effect that corrects nothing for want of something it is not told.
@@ -154,7 +147,7 @@ class EffectCorrection:
         ``context`` are the columns whose values are known.
         """
         said = [
-            (effect.unavailable_inputs(item.settings, context, wearing), effect.name)
+            (unavailable_inputs(effect, item.settings, context, wearing), effect.name)
             for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
         ]
         return tuple(f"{lacking}: {name} is not corrected" for lacking, name in said if lacking)
@@ -248,19 +241,18 @@ class EffectCorrection:
         return total
 
     def _uncertain_in(self, wearing: str) -> list[tuple[np.ndarray | slice, Uncertainty]]:
-        found = [
-            (lanes, effect.uncertainty(item.settings, item.weights, wearing))
+        of_wearings = [
+            (each, item, lanes)
             for effect, (item, lanes) in zip(self._effects, self._lanes, strict=True)
+            if (each := effect.weights(item.settings).of_wearings) is not None
         ]
+        found = [(lanes, each.uncertainty(item.weights, wearing)) for each, item, lanes in of_wearings]
         uncertain = [(lanes, variance) for lanes, variance in found if variance is not None]
         if self._unseen is None:
             return uncertain
         if self._unseen.is_seen(wearing):
             return []
-        if any(
-            effect.knows_wearing(item.settings, wearing)
-            for effect, (item, _) in zip(self._effects, self._lanes, strict=True)
-        ):
+        if any(each.knows(wearing) for each, _, _ in of_wearings):
             return uncertain
 
         def beyond(own: np.ndarray) -> np.ndarray:
@@ -376,16 +368,17 @@ def _holds(
     found: dict[str, Hold] = {}
     for item in effects:
         effect = item.effect
-        hold = effect.hold(item.settings, rotations, sensors) if isinstance(effect, SignatureEffect) else None
+        live = effect.live if isinstance(effect, RepairEffect) else None
+        hold = None if live is None else live.hold(item.settings, rotations, sensors)
         if hold is not None:
             found[item.name] = hold
     return list(found.items())
 
 
-def _fitting(added: AddedEffect) -> Effect:
+def _fitting(added: AddedEffect) -> CorrectionEffect:
     """Its effect, if it still has the parameters and columns that the model learned."""
-    effect = added.effect
-    wanted = (len(effect.parameters), len(effect.weight_names(added.settings)))
+    effect = added.correction
+    wanted = (len(effect.shape.parameters), len(effect.weights(added.settings).names))
     learned = (added.shape.shape[1], added.own_count)
     if learned != wanted:
         raise BadInput(

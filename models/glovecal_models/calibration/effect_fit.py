@@ -17,21 +17,24 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import AddedEffect, form_values
-from glovecal_models.calibration.effect_request import EffectRequest
+from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, form_values
 from glovecal_models.calibration.fit_task import FitResult, FitTask, run_task
 from glovecal_models.calibration.fitted_effects import fitted_effects, with_curves
-from glovecal_models.calibration.joint_rows import base_rows, joint_weights, signals_of_lanes
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
-from glovecal_models.calibration.own_signal import OwnSignal
-from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.prepared_takes import (
+    OwnSignal,
+    PreparedTakes,
+    base_rows,
+    joint_weights,
+    signals_of_lanes,
+)
 from glovecal_models.calibration.samples import Samples, joined_variances, sampled_rows
 from glovecal_models.calibration.template import palm_samples
 from glovecal_models.calibration.training_plan import correspondence_by, task_for
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
-from glovecal_models.regression.lmc_search import LmcOptimum
+from glovecal_models.regression.fast_lmc import LmcOptimum
 from glovecal_models.regression.regressor import Regressor
 
 MOST_TURNS = 4
@@ -278,12 +281,12 @@ def with_new_weights(
     ``columns``: for each rotation what it is read from. ``is_linear``: the base is a straight line.
     """
     rows = {name: takes.rows(name) for name in own}
-    signals = [signals_of_lanes(takes, each.effect, each.rotations, columns, own) for each in effects]
+    signals = [signals_of_lanes(takes, each.correction, each.rotations, columns, own) for each in effects]
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in own}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in own}
     every = [added.columns_of_takes(part) for added, part in zip(effects, signals, strict=True)]
     for added, found in zip(effects, every, strict=True):
-        prior = added.effect.prior_sd(added.settings)
+        prior = added.correction.weights(added.settings).prior_sd
         prior = np.concatenate([prior, np.ones(added.weights.shape[1] - len(prior))])
         for lane, name in enumerate(added.rotations):
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
@@ -297,10 +300,10 @@ def with_new_weights(
         settings = added.settings
         if added.form is not None:
             values = [
-                form_values(added.effect, take, part[:, :, : added.own_count], settings)
+                form_values(added.correction, take, part[:, :, : added.own_count], settings)
                 for take, part in zip(of_takes, found, strict=True)
             ]
-            settings = with_curves(settings, added.effect.form_unit, values, rows, degrees)
+            settings = with_curves(settings, values, rows, degrees)
         result.append(
             replace(
                 added,

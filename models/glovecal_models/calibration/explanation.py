@@ -7,102 +7,34 @@ the terms of a rotation by rule are those of the rotations that it follows, weig
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.correction_parts import CorrectionParts, PartKind
+from glovecal_models.calibration.answer import (
+    AngleTerms,
+    Explanation,
+    FrameExplanation,
+    Measured,
+    Repair,
+    Term,
+    TermKind,
+)
+from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_models.calibration.samples import require_layout
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
+from glovecal_models.effects.base.effect import RepairEffect, has_memory
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 from glovecal_models.takes.take import Take
 
-TermKind = Literal["base", "noise"] | PartKind
 BASE, NOISE = "base", "measurement noise"
 OUTSIDE_S = 0.05
 """A time this little before or after a take is a rounded one."""
 ORDER: tuple[TermKind, ...] = ("base", "held", "correction", "noise", "interval")
-
-
-@dataclass(frozen=True)
-class Term:
-    """One term of one angle."""
-
-    name: str
-    """An effect's, or ``base``: the regressor alone, or ``measurement noise``."""
-    kind: TermKind
-    degrees: float
-    variance: float | None
-    """Degrees squared; None: the model does not store it. Negative: so much of the measurement noise is
-    explained."""
-    is_claimed: bool
-    """Whether its variance is in the claimed standard deviation of the angle."""
-
-    @property
-    def sd_deg(self) -> float | None:
-        """None where it is not stored, and where it takes away from the noise."""
-        return None if self.variance is None or self.variance < 0 else float(np.sqrt(self.variance))
-
-
-@dataclass(frozen=True)
-class AngleTerms:
-    """One rotation in one frame; the terms' degrees add up to the angle."""
-
-    rotation: str
-    degrees: float
-    sd_deg: float
-    """Claimed, of a measurement of the rotation: noise included."""
-    flags: int
-    """As in ``GloveAngles``."""
-    terms: tuple[Term, ...]
-    sources: tuple[str, ...]
-    """Rotations that it is computed from by rule; empty: it is read from sensors."""
-    readings: Mapping[str, float]
-    """Raw readings of the sensors that the base reads."""
-    is_corrected: bool
-    """False where the corrections were unusable and left out."""
-
-
-@dataclass(frozen=True)
-class MeasuredTerm:
-    """What one repair of the measurement changes of the measured angle."""
-
-    name: str
-    degrees: float | None
-    """None: the frame is not compared, as the repair takes the measurement there away."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """The measured angle at the frame, as it is compared with the model."""
-
-    recorded_deg: float
-    repairs: tuple[MeasuredTerm, ...]
-    degrees: float | None
-    """After the repairs; None: not compared."""
-
-
-@dataclass(frozen=True)
-class FrameExplanation:
-    """All rotations of one frame of a glove."""
-
-    time_s: float
-    angles: tuple[AngleTerms, ...]
-    faulty_sensors: tuple[str, ...]
-    transient_s: float | None
-    """How long ago effects with a memory began anew, where they have not settled yet; None: they have."""
-    settling_s: float
-    """How long they take; 0: nothing is remembered."""
-    remembering: tuple[str, ...]
-    """The effects that remember."""
-    silent: tuple[str, ...]
-    """A sentence for each effect that corrects nothing for want of something it is not told."""
 
 
 @dataclass(frozen=True)
@@ -126,21 +58,6 @@ class PredictedFrame:
     """How long they take; 0: nothing is remembered."""
     silent: Sequence[str]
     """As ``EffectCorrection.silent`` says."""
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """One frame of a take."""
-
-    take: str
-    wearing: str
-    simulated: bool
-    asked_s: float
-    number: int
-    """Of the frame in the take, 0 for the first."""
-    frame: FrameExplanation
-    measured: Mapping[str, Measured]
-    """By rotation; only those that were measured there."""
 
 
 class FrameExplainer:
@@ -178,13 +95,15 @@ class FrameExplainer:
         self._began_s = self._last_s = -np.inf
 
 
-def explain(model: CalibrationModel, take: Take, at_s: float) -> Explanation:
+def explain(model: CalibrationModel, take: Take, at_s: float, rotations: Sequence[str] = ()) -> Explanation:
     """The frame of ``take`` nearest to ``at_s``, seconds of the take's own clock.
 
-    Effects with a memory start at the take's first frame, as in ``GlovePredictor.predict_take``. Raises
-    BadInput for a time outside the take, LayoutMismatch.
+    ``rotations``: only these; none named: all of the model. Effects with a memory start at the take's first
+    frame, as in ``GlovePredictor.predict_take``. Raises BadInput for a time outside the take and for a
+    rotation that the model does not have, LayoutMismatch.
     """
     require_layout(take, model.layout)
+    chosen = chosen_rotations(model, rotations)
     first, last = float(take.time_s[0]), float(take.time_s[-1])
     if not first - OUTSIDE_S <= at_s <= last + OUTSIDE_S:
         raise BadInput(f"take {take.name!r} lasts from {first:.3f} to {last:.3f} s; there is no {at_s:g} s")
@@ -209,7 +128,12 @@ def explain(model: CalibrationModel, take: Take, at_s: float) -> Explanation:
     )  # fmt: skip
     frame = explained(model, predictor, last)
     measured = _measured(model, take, number, predictor)
-    return Explanation(take.name, take.wearing, take.simulated, at_s, number, frame, measured)
+    frame = replace(
+        frame, rotations=[item.with_measured(measured.get(item.rotation)) for item in frame.rotations]
+    )
+    return Explanation(
+        **frame.facts(chosen), name=take.name, wearing=take.wearing, simulated=take.simulated, frame=number
+    )
 
 
 def chosen_rotations(model: CalibrationModel, wanted: Sequence[str]) -> tuple[str, ...]:
@@ -267,10 +191,10 @@ def explained(model: CalibrationModel, predictor: GlovePredictor, frame: Predict
         )
         for at, item in enumerate(model.rotations)
     )
-    remembering = [item.name for item in model.effects if item.effect.has_memory and item.weights.any()]
+    remembering = [item.name for item in model.effects if has_memory(item.effect) and item.weights.any()]
     return FrameExplanation(
         time_s=frame.time_s,
-        angles=found,
+        rotations=found,
         faulty_sensors=parts.faulty_sensors[-1],
         transient_s=frame.since_start_s if frame.since_start_s < frame.settling_s else None,
         settling_s=frame.settling_s,
@@ -320,16 +244,19 @@ def _measured(
         return {}
     at_s, before = float(take.time_s[number]), recorded
     repairs: list[tuple[str, np.ndarray]] = []
-    effects = [(item.effect, item.settings) for item in model.effects if item.effect.kind == "repair"]
+    effects = [
+        (known, item.settings) for item in model.effects if isinstance(known := item.effect, RepairEffect)
+    ]
     for needs_prediction in (False, True):
         for effect, settings in effects:
-            if not isinstance(effect, SignatureEffect) or effect.needs_prediction != needs_prediction:
+            by_prediction = effect.by_prediction
+            if (by_prediction is not None) != needs_prediction:
                 continue
-            if needs_prediction:
+            if by_prediction is not None:
                 columns = [take.sensors.index(name) for name in model.layout.sensors]
                 readings = take.readings[:, columns]
                 predicted = predictor.predict_take(take.time_s, readings, take.context, take.wearing).mean
-                take = effect.repaired_to(take, settings, names, predicted)
+                take = by_prediction.repaired_to(take, settings, names, predicted)
             else:
                 take = effect.repaired([take], settings)[0]
             kept = np.flatnonzero(take.time_s == at_s)
@@ -339,7 +266,7 @@ def _measured(
     return {
         name: Measured(
             float(recorded[at]),
-            tuple(MeasuredTerm(effect, _number(change[at])) for effect, change in repairs),
+            tuple(Repair(effect, _number(change[at])) for effect, change in repairs),
             _number(before[at]),
         )
         for at, name in enumerate(names)

@@ -16,16 +16,14 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
-from glovecal_models.calibration.prior_mean import fit_on_plane, plane_for
-from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
+from glovecal_models.calibration.sample_weight import Recorded, fit_linear_with_variance, fit_weighted
+from glovecal_models.calibration.template import fit_on_plane, plane_for
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.kernel_candidates import CHOOSING
-from glovecal_models.regression.known_line import fit_beside
-from glovecal_models.regression.linear_regressor import rescale_readings
+from glovecal_models.regression.linear_regressor import fit_beside, rescale_readings
 from glovecal_models.regression.regressor import Regressor
-from glovecal_models.regression.sample_noise import fit_linear_with_variance
 from glovecal_models.regression.spgp import fit_spgp
 
 

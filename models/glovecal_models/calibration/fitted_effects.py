@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.added_effect import CURVES, FORM, AddedEffect, form_values
-from glovecal_models.calibration.effect_request import EffectRequest
+from glovecal_models.calibration.added_effect import CURVES, FORM, AddedEffect, EffectRequest, form_values
 from glovecal_models.calibration.form_choice import FormRows, chosen_columns, chosen_form
 from glovecal_models.calibration.held_out import (
     BaseProducts,
@@ -20,15 +19,19 @@ from glovecal_models.calibration.held_out import (
     Rows,
     held_out,
 )
-from glovecal_models.calibration.joint_rows import base_rows, joint_weights, signals_of_lanes
-from glovecal_models.calibration.own_signal import OwnSignal
-from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.prepared_takes import (
+    OwnSignal,
+    PreparedTakes,
+    base_rows,
+    joint_weights,
+    signals_of_lanes,
+)
 from glovecal_models.effects.base.column_steps import IN_STEPS, learned_steps
 from glovecal_models.effects.base.context_effect import ContextEffect
-from glovecal_models.effects.base.facts import Settings
+from glovecal_models.effects.base.effect import CorrectionEffect, FormSignals
 from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.effects.base.learned_form import LearnedForm
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signals import Settings, Signals
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
 
@@ -54,18 +57,18 @@ def fitted_effects(
     extra: dict[str, list[list[np.ndarray]]] = {name: [] for name in touched}
     priors: dict[str, list[np.ndarray]] = {name: [] for name in touched}
     shapes: list[np.ndarray] = []
-    inputs: dict[int, list[dict[str, np.ndarray]]] = {}
+    inputs: dict[int, list[FormSignals]] = {}
     for place, group in enumerate(groups):
         stop_if(cancelled, "adding an effect")
         # The first turn's shapes only tell the base what to leave out: the grid is fine enough for that.
         shape = best_shape(group, rows, bases, extra, refinements=REFINEMENTS if is_last else 0)
         shapes.append(shape)
-        effect = group.wanted.effect
+        effect = group.effect
         if is_last:
             group = groups[place] = _with_curves(group, shape, rows, bases, extra, priors)
             group = groups[place] = _with_steps(group, shape, rows, bases, extra)
-        found = effect.columns_of_takes(group.signals, group.settings, shape)
-        own_prior = effect.prior_sd(group.settings)
+        found = effect.dynamics.columns_of_takes(group.signals, group.settings, shape)
+        own_prior = effect.weights(group.settings).prior_sd
         for lane, name in enumerate(group.lanes):
             extra[name].append([part[index, lane] for part, index in zip(found, rows[name], strict=True)])
             priors[name].append(own_prior)
@@ -89,11 +92,11 @@ def fitted_effects(
             used[name] += 1
         settled = group.settings
         if place in inputs:
-            settled = with_curves(settled, group.wanted.effect.form_unit, inputs[place], rows, degrees)
+            settled = with_curves(settled, inputs[place], rows, degrees)
         zero = np.array([own[name].zero_deg for name in group.lanes])
         mean = np.array([each.mean for each in mine])
-        is_told = group.wanted.effect.tells_own_uncertainty
-        covariance = None if is_told else np.array([each.covariance for each in mine])
+        of_wearings = group.effect.weights(group.settings).of_wearings
+        covariance = None if of_wearings is not None else np.array([each.covariance for each in mine])
         added.append(
             AddedEffect(group.wanted.name, group.lanes, settled, shape, mean, zero, covariance=covariance)
         )
@@ -121,19 +124,19 @@ def _with_curves(
     priors: Mapping[str, list[np.ndarray]],
 ) -> EffectGroup:
     """With those of the effect's further columns that the takes ask for; ``extra`` are of effects before."""
-    effect = group.wanted.effect
-    choices = [group.settings, *effect.settings_with_curves(group.signals, group.settings)]
+    effect = group.effect
+    choices = [group.settings, *effect.further.choices(group.signals, group.settings)]
     if len(choices) == 1:
         return group
 
     def lanes(settings: Settings) -> list[FormRows]:
         found = [effect.columns(take, settings, shape) for take in group.signals]
-        prior = effect.prior_sd(settings)
+        prior = effect.weights(settings).prior_sd
         problems = []
         for lane, name in enumerate(group.lanes):
             mine = [part[index, lane] for part, index in zip(found, rows[name], strict=True)]
             every, sd = [*extra[name], mine], [*priors[name], prior]
-            problems.append(_form_rows(bases[name], every, sd, effect.take_sd_deg))
+            problems.append(_form_rows(bases[name], every, sd, 0.0))
         return problems
 
     return replace(group, settings=choices[chosen_columns(map(lanes, choices))])
@@ -148,10 +151,10 @@ def _with_steps(
 ) -> EffectGroup:
     """With the steps in which a slow cause acts, where none are known and these takes show them; ``extra`` as
     above."""
-    effect = group.wanted.effect
+    effect = group.effect
     if not isinstance(effect, ContextEffect) or not effect.may_act_in_steps or IN_STEPS in group.settings:
         return group
-    found = effect.columns_of_takes(group.signals, group.settings, shape)
+    found = effect.dynamics.columns_of_takes(group.signals, group.settings, shape)
     left = []
     for lane, name in enumerate(group.lanes):
         mine = [part[index, lane] for part, index in zip(found, rows[name], strict=True)]
@@ -168,7 +171,7 @@ def _with_steps(
 
 def _learned_form(
     group: EffectGroup,
-    values: Sequence[Mapping[str, np.ndarray]],
+    values: Sequence[FormSignals],
     rows: Mapping[str, Sequence[np.ndarray]],
     bases: Mapping[str, list[Rows]],
     extra: Mapping[str, list[list[np.ndarray]]],
@@ -185,7 +188,7 @@ def _learned_form(
             {key: column[index][:, [lane]] for key, column in take.items()}
             for take, index in zip(values, rows[name], strict=True)
         ]
-        sd = group.wanted.effect.take_sd_deg
+        sd = values[0].take_sd_deg
         problems.append(_form_rows(bases[name], extra[name], priors[name], sd, inputs))
     terms = chosen_form(problems)
     if not terms:
@@ -203,8 +206,7 @@ def _learned_form(
 
 def with_curves(
     settings: Settings,
-    unit: str,
-    values: Sequence[Mapping[str, np.ndarray]],
+    values: Sequence[FormSignals],
     rows: Mapping[str, Sequence[np.ndarray]],
     degrees: Mapping[str, Sequence[np.ndarray]],
 ) -> Settings:
@@ -222,7 +224,7 @@ def with_curves(
             )
             for key in used
         }
-        curves[name] = LaneCurves.over(inputs, unit, np.concatenate(parts)).to_document()
+        curves[name] = LaneCurves.over(inputs, values[0].unit, np.concatenate(parts)).to_document()
     return settings | {FORM: settings[FORM] | {CURVES: curves}} if curves else settings
 
 
@@ -232,14 +234,13 @@ def _groups(
     columns: Mapping[str, Correspondence],
     own: Mapping[str, OwnSignal],
 ) -> list[EffectGroup]:
-    names = [name for name in item.rotations if name in own]
-    sets = [(name,) for name in names] if item.effect.one_joint_at_a_time else [tuple(names)]
+    names, effect = [name for name in item.rotations if name in own], item.correction
+    sets = [(name,) for name in names] if effect.comparison.is_joint_by_joint else [tuple(names)]
     groups = []
     for lanes in sets:
-        signals = signals_of_lanes(takes, item.effect, lanes, columns, own)
-        settings = item.effect.fit_repair_constants(signals)
-        settings = item.effect.settings_with_found(settings, item.settings)
-        groups.append(EffectGroup(item, lanes, signals, settings))
+        signals = signals_of_lanes(takes, effect, lanes, columns, own)
+        settings = effect.further.with_found(effect.further.constants(effect, signals), item.settings)
+        groups.append(EffectGroup(item, effect, lanes, signals, settings))
     return groups
 
 
@@ -255,6 +256,7 @@ class EffectGroup:
     """Lanes of one effect that share settings."""
 
     wanted: EffectRequest
+    effect: CorrectionEffect
     lanes: tuple[str, ...]
     signals: list[Signals]
     settings: Settings
@@ -269,8 +271,8 @@ def best_shape(
     refinements: int = REFINEMENTS,
 ) -> np.ndarray:
     """(L, P): the best of the effect's grid, then of ``refinements`` finer ones around it."""
-    effect, settings = group.wanted.effect, group.settings
-    grid = effect.grid(group.signals, settings)
+    effect, settings = group.effect, group.settings
+    grid = effect.shape.grid(group.signals, settings)
     if grid.shape[0] == 1 or grid.shape[2] == 0:
         return grid[0]
     products = {
@@ -282,7 +284,7 @@ def best_shape(
         )
         for name in group.lanes
     }
-    prior = effect.prior_sd(settings)
+    prior = effect.weights(settings).prior_sd
     units = [list(enumerate(rows[name])) for name in group.lanes]
     fitted = FittedRows.of([len(take) for take in group.signals], units)
     best = np.zeros((len(group.lanes), grid.shape[2]))
@@ -290,7 +292,7 @@ def best_shape(
         shapes, lanes, numbers = grid.shape
         flat = grid.reshape(shapes * lanes, numbers)
         tiled = [_tiled(take, shapes) for take in group.signals]
-        found = FittedColumns.of(effect.columns_of_takes(tiled, settings, flat), fitted)
+        found = FittedColumns.of(effect.dynamics.columns_of_takes(tiled, settings, flat), fitted)
         for lane, name in enumerate(group.lanes):
             best[lane] = grid[held_out(products[name], found.units(lane), prior).shape, lane]
         grid = _finer(grid, best)

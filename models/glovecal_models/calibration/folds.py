@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.effects.base.control import motion_words
+from glovecal_models.errors import NotTrainable
 
 STRETCHES = 8
 QUARTERS = 4
@@ -54,6 +55,24 @@ def folds_over_takes(take: np.ndarray, count: int) -> list[Fold]:
         Fold((stretch % count) == fold, f"stretches of the only take, one in {count}")
         for fold in range(count)
     ]
+
+
+def usable_folds(
+    folds: Iterable[np.ndarray], check_rest: Callable[[np.ndarray], object]
+) -> list[tuple[int, np.ndarray]]:
+    """Number and mask (N,) of what is left out, of those whose rest can carry a model.
+
+    ``check_rest`` gets the mask (N,) of what is kept, and raises NotTrainable where that is too little: such
+    a fold says nothing about the error.
+    """
+    found = []
+    for number, held_out in enumerate(folds):
+        try:
+            check_rest(~held_out)
+        except NotTrainable:
+            continue
+        found.append((number, held_out))
+    return found
 
 
 def wearing_groups(wearings: Sequence[str]) -> list[tuple[str, ...]]:

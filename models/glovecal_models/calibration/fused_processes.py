@@ -12,9 +12,8 @@ from threading import local
 
 import numpy as np
 
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import Regressor
+from glovecal_models.covariance.functions import SquaredExponentialArd
+from glovecal_models.regression.regressor import ProcessRegressor, Regressor
 
 DROPPED_VARIANCE = 1e-9
 """Degrees squared: what is left out of the variance, at most, for fewer columns of its root."""

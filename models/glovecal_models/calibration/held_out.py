@@ -19,10 +19,9 @@ from math import comb
 
 import numpy as np
 
-from glovecal_models.calibration.sample_weight import effective_sample_ratio
+from glovecal_models.calibration.sample_weight import effective_sample_ratio, sample_noise
 from glovecal_models.effects.base.assessment import saved_share
 from glovecal_models.effects.base.signals import as_slice
-from glovecal_models.regression.sample_noise import sample_noise
 
 BASE_RIDGE = 1e-6
 ALIKE_ROWS = 100.0
@@ -91,7 +90,7 @@ def with_precision(units: Sequence[Rows], variance: Sequence[np.ndarray | None])
     """The units with weights from stated variances (N,) of their rows, degrees squared: 0 where a unit states
     none. Unchanged where no unit states any, or all state the same.
 
-    What the base leaves beside the stated variances is added to each (``regression.sample_noise``).
+    What the base leaves beside the stated variances is added to each (``calibration.sample_weight``).
     """
     if all(part is None for part in variance):
         return list(units)

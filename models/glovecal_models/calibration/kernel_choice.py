@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.folds import folds_over_takes
+from glovecal_models.calibration.folds import folds_over_takes, usable_folds
 from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
 from glovecal_models.calibration.samples import Samples, representative_index
 from glovecal_models.calibration.training_settings import TrainingSettings
@@ -22,7 +22,7 @@ from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.regression.kernel_candidates import CANDIDATE, LMC, KernelCandidate, candidates_of
 from glovecal_models.regression.kernel_scores import CandidateScore, KernelScores, with_choice
 from glovecal_models.regression.linear_regressor import fit_linear
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import check_samples
 
 TRIED_SAMPLES = 500
@@ -163,15 +163,13 @@ def _spread(samples: Recorded, seed: int) -> np.ndarray:
 
 def _usable_folds(samples: Recorded, chosen: np.ndarray) -> list[np.ndarray]:
     """Masks (N,) of what is left out; of those whose rest can carry a model."""
-    found = []
-    for fold in folds_over_takes(samples.take, FOLDS):
-        kept = chosen[~fold.held_out[chosen]]
-        try:
-            check_samples(samples.inputs[kept], samples.target[kept])
-        except NotTrainable:
-            continue
-        found.append(fold.held_out)
-    return found
+
+    def check_rest(kept: np.ndarray) -> None:
+        some = chosen[kept[chosen]]
+        check_samples(samples.inputs[some], samples.target[some])
+
+    folds = folds_over_takes(samples.take, FOLDS)
+    return [held_out for _, held_out in usable_folds((fold.held_out for fold in folds), check_rest)]
 
 
 def fit_best_kernel(

@@ -15,8 +15,7 @@ from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.names import did_you_mean
 from glovecal_models.regression.linear_regressor import LinearRegressor
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import Regressor, RuleRegressor
+from glovecal_models.regression.regressor import ProcessRegressor, Regressor, RuleRegressor
 
 _KINDS: dict[str, type[Regressor]] = {
     "linear": LinearRegressor,
@@ -141,7 +140,7 @@ class CalibrationModel:
 
     def has_seen(self, wearing: str) -> bool | None:
         """Whether the wearing was in training, or in a quick check; None: the model does not say."""
-        if any(item.effect.knows_wearing(item.settings, wearing) for item in self.effects):
+        if any(item.of_wearings and item.of_wearings.knows(wearing) for item in self.effects):
             return True
         return None if self.unseen_wearing is None else self.unseen_wearing.is_seen(wearing)
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.calibration.correction_parts import VarianceInflation
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.fused_processes import FusedProcesses, grouped_by_nodes, is_fusible
-from glovecal_models.calibration.interval_inflation import VarianceInflation
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.errors import BadInput
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import RuleRegressor
+from glovecal_models.regression.regressor import ProcessRegressor, RuleRegressor
 
 EXTRAPOLATING, TOO_UNCERTAIN, BY_RULE, FAULTY_SENSOR = 1, 2, 4, 8
 RANGE_MARGIN = 0.05

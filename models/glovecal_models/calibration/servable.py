@@ -1,16 +1,121 @@
-"""Whether a model can do what it is served for: predict frames of its own layout."""
+"""Whether a model can do what it is served for: predict frames of its own layout.
+
+Whether some seconds of motion look like the hand and the glove that a model learned.
+
+No reference is needed. Another person in the glove, or a glove of the other hand, gives angles that no hand
+reaches, and bends sensors beyond all that was trained on; the right person after putting it on again does the
+first by little, the second more often. Both are summed, each sensor and rotation counting for a limited part,
+so that one that slipped or broke is not taken for another person.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.wearer_fit import WearerFit
+from glovecal_models.calibration.samples import trained_ranges
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 
+END_SHARE = 0.02
+"""Of the frames beyond an end that do not count: noise and single frames."""
+MOST_OF_ONE = 0.07
+"""Of its range: what a single sensor or rotation counts for at most."""
+READING_WEIGHT = 0.1
+"""What a reading counts for beside an angle: the right person moves beyond the trained readings too."""
+MISFIT_LIMIT, LINEAR_MISFIT_LIMIT = 0.068, 0.085
+"""Above it the readings are not those of the model's wearer. Chosen on 8 simulated gloves (seeds 0 to 7):
+in 5.3 hours of motion 3 of their 32 right wearings went above it with either method; a linear model's angles
+leave the hand's range sooner. Other gloves prove it: tests/service/test_live_watch.py."""
+EXCUSED_SD = 2.0
+"""Standard deviations of a rotation's noise, by which angles of the right wearer leave the hand's range."""
+FAR_SHARE = 0.02
+"""Of its range beyond an end: a sensor or rotation that is named."""
+FEWEST_FAR = 3
+"""With fewer it may be a sensor that slipped, and its neighbours."""
+SIDEWAYS = ("IM_ABD", "MR_ABD", "RP_ABD", "W_ABD")
+"""Of the other sign in a glove of the other hand (VRJuggler's driver)."""
 LARGEST_DEG = 1e5
 """No linear model leaves this within its sensors' range, and a pose's float32 holds it."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Of some seconds of motion."""
+
+    total: float
+    """Sum over sensors and rotations, each as a share of its range; small for the right wearer."""
+    limit: float
+    sensors: tuple[str, ...]
+    """Those that go far beyond what was learned, the farthest first."""
+    rotations: tuple[str, ...]
+    """Those that reach far beyond the hand's range, likewise."""
+
+    @property
+    def is_clear(self) -> bool:
+        return self.total > self.limit and len({*self.sensors, *self.rotations}) >= FEWEST_FAR
+
+    @property
+    def is_sideways(self) -> bool:
+        """Mostly the sensors whose sign tells the hand."""
+        across = sum(name in SIDEWAYS for name in self.sensors[: len(SIDEWAYS)])
+        return across >= 2 and across * 2 >= len(self.sensors)
+
+
+class WearerFit:
+    """What one model learned, ready to hold frames against it."""
+
+    def __init__(self, model: CalibrationModel, predictor: GlovePredictor) -> None:
+        """``predictor`` of the same model: its rotations are the columns of the angles that will be given."""
+        self.sensors, self.rotations = model.layout.sensors, tuple(predictor.rotations)
+        self._limit = LINEAR_MISFIT_LIMIT if model.method == "linear" else MISFIT_LIMIT
+        self.low, self.high = trained_ranges(model.rotations, self.sensors)
+        self._span = np.where(self.high > self.low, self.high - self.low, np.nan)
+        ranges = [ACTIVE_RANGE_DEG.get(name, (-np.inf, np.inf)) for name in self.rotations]
+        least, most = np.array(ranges).reshape(-1, 2).T
+        self._width = most - least
+        learned = self._within_training(predictor)
+        self._least, self._most = np.fmin(least, learned.min(axis=0)), np.fmax(most, learned.max(axis=0))
+        noise = {item.rotation: item.regressor.noise_variance for item in model.rotations}
+        self._excused = EXCUSED_SD * np.sqrt(
+            [max(0.0, float(noise.get(name, 0.0))) for name in self.rotations]
+        )
+
+    def _within_training(self, predictor: GlovePredictor) -> np.ndarray:
+        """(2 S, R) angles with each sensor at an end of its trained range, the others in the middle.
+
+        What these reach the right wearer reaches: with joints of more than the usual range, or by a base that
+        leaves it.
+        """
+        middle, places = np.nan_to_num((self.low + self.high) / 2), np.arange(len(self.sensors))
+        readings = np.tile(middle, (2, len(places), 1))
+        readings[:, places, places] = np.where(np.isnan(self._span), middle, [self.low, self.high])
+        return predictor.predict(readings.reshape(-1, len(places))).mean
+
+    def misfit(self, readings: np.ndarray, degrees: np.ndarray) -> Misfit:
+        """Of ``readings`` (N, S) and the base's ``degrees`` (N, R) of the same or other frames."""
+        bend = np.nan_to_num(_beyond(readings, self.low, self.high) / self._span)
+        over = np.fmax(0.0, _beyond(degrees, self._least, self._most) - self._excused)
+        over = np.nan_to_num(over / self._width)
+        total = READING_WEIGHT * np.minimum(bend, MOST_OF_ONE).sum() + np.minimum(over, MOST_OF_ONE).sum()
+        return Misfit(float(total), self._limit, _far(bend, self.sensors), _far(over, self.rotations))
+
+
+def _far(shares: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(names[place] for place in np.argsort(shares)[::-1] if shares[place] > FAR_SHARE)
+
+
+def _beyond(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """How far the ends of ``values`` (N, C) lie outside, (C,), zero inside."""
+    if not len(values):
+        return np.zeros(values.shape[1])
+    place = int(END_SHARE * len(values))
+    ordered = np.partition(values, (place, len(values) - 1 - place), axis=0)
+    least, most = ordered[place], ordered[len(values) - 1 - place]
+    return np.nan_to_num(np.fmax(0.0, np.fmax(low - least, most - high)))
 
 
 def check_servable(model: CalibrationModel) -> None:

@@ -1,17 +1,17 @@
-"""Sentences about training: which samples, sensors and weights a model was trained with."""
+"""Sentences about training: which samples, sensors and weights a model was trained with; its effects."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from glovecal_models.calibration.explanation import AngleTerms, FrameExplanation, Measured
+from glovecal_models.calibration.added_effect import AddedEffect
+from glovecal_models.calibration.answer import ModelEffect
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.order_confounding import OrderConfounding
-from glovecal_models.calibration.predictor import EXTRAPOLATING, FAULTY_SENSOR, TOO_UNCERTAIN
-from glovecal_models.calibration.training_plan import TrainingPlan
+from glovecal_models.calibration.training_plan import TrainingPlan, UsableSensors
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
-from glovecal_models.calibration.usable_sensors import UsableSensors
+from glovecal_models.effects.base.effect import has_memory
 from glovecal_models.effects.catalogue import wearing_effect
 
 COUNTED_BY = ("lmc_gpr", "linear", "two_shapes")
@@ -43,16 +43,16 @@ def plan_sentences(plan: TrainingPlan) -> list[str]:
 
 def _camera_sentences(plan: TrainingPlan) -> list[str]:
     """Which angles a camera saw, and what it adds to the held-out errors."""
-    stated = [item.deviation_deg for item in plan.camera_ranges if item.effective_samples]
+    stated = [item.sd_deg for item in plan.camera_ranges if item.sd_deg is not None]
     if not stated:
-        return [item.sentence() for item in plan.camera_ranges]
+        return [item.sentence for item in plan.camera_ranges]
     rms = sum(sd**2 for sd in stated) ** 0.5 / len(stated) ** 0.5
     start = (
         f"A camera measured {len(stated)} rotations; samples count by its stated deviation"
         f"{'' if plan.settings.method in COUNTED_BY else f' (not by method {plan.settings.method})'}. "
         f"Held-out errors contain its own, {rms:.1f} degrees (RMS)."
     )
-    return [start, *(item.sentence() for item in plan.camera_ranges)]
+    return [start, *(item.sentence for item in plan.camera_ranges)]
 
 
 def dead_sensor_sentences(usable: UsableSensors, rotations: Sequence[str]) -> list[str]:
@@ -101,61 +101,6 @@ def weight_sentence(rotation: str, evidence: Mapping[str, Any]) -> str | None:
     )
 
 
-def frame_sentences(frame: FrameExplanation) -> list[str]:
-    """What holds for all angles of a frame: a transient, failing sensors, effects without their inputs."""
-    sentences = []
-    if frame.transient_s is not None:
-        sentences.append(
-            f"Transient: {', '.join(frame.remembering)} began anew {frame.transient_s:.1f} s ago and settles "
-            f"after {frame.settling_s:.1f} s; until then the term is uncertain."
-        )
-    if frame.faulty_sensors:
-        several = len(frame.faulty_sensors) > 1
-        sentences.append(
-            f"Faulty sensor{'s' * several}: {', '.join(frame.faulty_sensors)}; rotations read from "
-            f"{'them' if several else 'it'} hold their last good angle."
-        )
-    return [*sentences, *(f"{sentence[0].upper()}{sentence[1:]}." for sentence in frame.silent)]
-
-
-def angle_sentences(angle: AngleTerms, measured: Measured | None) -> list[str]:
-    """What else there is to say about one explained angle."""
-    sentences = []
-    if angle.flags & FAULTY_SENSOR:
-        sentences.append("Held: a sensor that it is read from fails; this is the last good angle.")
-    if angle.flags & EXTRAPOLATING:
-        sentences.append("Extrapolating: a reading lies outside those of training.")
-    if not angle.is_corrected:
-        sentences.append(
-            "Not corrected: the corrections are not finite or beyond a full turn, and were left out."
-        )
-    elif angle.flags & TOO_UNCERTAIN:
-        sentences.append("Too uncertain to use.")
-    if angle.sources:
-        sentences.append(f"By rule from {', '.join(angle.sources)}: its terms are theirs, weighted.")
-    if any(item.variance is None for item in angle.terms):
-        sentences.append("Not stored: the model has no standard deviation of this term.")
-    if any(item.variance is not None and item.variance < 0 for item in angle.terms):
-        sentences.append("A term without a standard deviation explains a part of the measurement noise.")
-    unclaimed = [item.name for item in angle.terms if item.variance is not None and not item.is_claimed]
-    if unclaimed:
-        sentences.append(f"Not in the angle's standard deviation: that of {', '.join(unclaimed)}.")
-    return sentences + ([] if measured is None else [_measured_sentence(angle, measured)])
-
-
-def _measured_sentence(angle: AngleTerms, measured: Measured) -> str:
-    changes = [
-        f"{item.name} {item.degrees:+.2f}" if item.degrees is not None else f"{item.name} takes it away"
-        for item in measured.repairs
-        if item.degrees != 0.0
-    ]
-    repaired = f" (recorded {measured.recorded_deg:.2f}; {', '.join(changes)})" if changes else ""
-    if measured.degrees is None:
-        return f"Measured: not compared{repaired}."
-    error = angle.degrees - measured.degrees
-    return f"Measured: {measured.degrees:.2f} degrees{repaired}; error {error:+.2f} degrees."
-
-
 def wearing_sentences(model: CalibrationModel, seen_deg: float | None) -> list[str]:
     """The error in a wearing not seen, then that in wearings seen (``seen_deg``), and what to do.
 
@@ -197,3 +142,20 @@ def _next_step(model: CalibrationModel) -> str:
     if has_shift:
         return f"The next wearing is much worse than those seen: {check}."
     return f"The next wearing is much worse than those seen: add {shift} (glovecal add-effect); {check}."
+
+
+def model_effect(added: AddedEffect) -> ModelEffect:
+    """Raises BadInput where the effect is not installed."""
+    effect = added.effect
+    return ModelEffect(
+        effect=added.name,
+        explanation=effect.about.explanation,
+        rotations=added.active,
+        parameters=added.described(),
+        curves=added.curves,
+        context=effect.context,
+        has_memory=has_memory(effect),
+        settling_s=added.transient_s,
+        evidence=added.evidence,
+        declaration=added.settings.get("declaration"),
+    )

@@ -1,28 +1,33 @@
-"""What will be fitted: samples gathered, representatives chosen, folds laid out."""
+"""What will be fitted: samples gathered, representatives chosen, folds laid out.
+
+Training without dead sensors: rotations that have others are read from those.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from glovecal_models.calibration.fit_task import FitTask
-from glovecal_models.calibration.folds import folds_over_takes, wearing_groups
-from glovecal_models.calibration.prior_mean import plane_for, with_sensors_of
+from glovecal_models.calibration.folds import folds_over_takes, usable_folds, wearing_groups
 from glovecal_models.calibration.samples import (
     Samples,
     gather_samples,
     linear_correspondence,
     linear_samples,
     representative_index,
+    require_layout,
 )
 from glovecal_models.calibration.template import (
     missing_shapes,
     palm_gain,
     palm_samples,
+    plane_for,
     template_correspondence,
     two_shapes,
+    with_sensors_of,
 )
 from glovecal_models.calibration.training_settings import (
     LINEAR_METHODS,
@@ -31,14 +36,52 @@ from glovecal_models.calibration.training_settings import (
     TrainingSettings,
     left_out_settings,
 )
-from glovecal_models.calibration.usable_sensors import UsableSensors, usable_sensors
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.names import did_you_mean
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.regression.training_samples import check_samples
-from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
+from glovecal_models.takes.camera_estimates import CoveredRange, covered_ranges
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import DeadSensor, dead_sensors
+
+
+@dataclass(frozen=True)
+class UsableSensors:
+    """What is left of a layout. The glove still sends all its sensors: only what is read of them changes."""
+
+    layout: Layout
+    """The same sensors; rotations are read from those that live."""
+    dead: tuple[DeadSensor, ...]
+    """Of the sensors that some rotation was read from."""
+    unreadable: tuple[str, ...]
+    """Rotations whose own sensor, or every sensor, is dead; they keep their correspondence."""
+
+
+def usable_sensors(layout: Layout, takes: Sequence[Take]) -> UsableSensors:
+    """Raises LayoutMismatch unless every take has every sensor of the layout."""
+    for take in takes:
+        require_layout(take, layout)
+    found = dead_sensors(takes, layout.sensors) if takes else ()
+    dead = {item.sensor for item in found}
+    reduced = [_reduced(item, dead) for item in layout.correspondences]
+    read = {name for item in layout.correspondences for name in item.sensors}
+    kept = (now or before for now, before in zip(reduced, layout.correspondences, strict=True))
+    return UsableSensors(
+        replace(layout, correspondences=tuple(kept)) if dead & read else layout,
+        tuple(item for item in found if item.sensor in read),
+        tuple(name for name, now in zip(layout.rotations, reduced, strict=True) if now is None),
+    )
+
+
+def _reduced(item: Correspondence, dead: set[str]) -> Correspondence | None:
+    living = tuple(name for name in item.sensors if name not in dead)
+    if living == item.sensors:
+        return item
+    if item.simulated is not None or not living or item.rotation in dead:
+        return None
+    kind = item.kind if item.kind == "MSMR" or len(living) > 1 else "1S1R"
+    return replace(item, sensors=living, kind=kind)
 
 
 @dataclass(frozen=True)
@@ -121,9 +164,8 @@ def plan_training(
         chosen[correspondence.rotation] = correspondence
         ranges[correspondence.rotation] = (samples.inputs.min(axis=0), samples.inputs.max(axis=0))
         palm = palm_samples(takes, correspondence) if settings.method == "template" else None
-        tasks.extend(_tasks(correspondence, samples, settings, palm))
-        without = _without_wearings(correspondence, samples, wearings, settings, palm)
-        tasks.extend(without)
+        own, without = _tasks(correspondence, samples, wearings, settings, palm)
+        tasks += [*own, *without]
         if without:
             gathered[correspondence.rotation] = samples
     for correspondence, samples in at_one_angle if not tasks else ():
@@ -180,43 +222,34 @@ def samples_by(method: Method, samples: Samples) -> Samples:
 
 
 def _tasks(
-    correspondence: Correspondence, samples: Samples, settings: TrainingSettings, palm: Samples | None
-) -> list[FitTask]:
-    tasks = [task_for(correspondence, samples, None, settings, palm=palm)]
-    for number, fold in enumerate(folds_over_takes(samples.take, settings.folds)):
-        kept = samples_by(settings.method, samples.select(~fold.held_out))
-        try:
-            check_samples(kept.inputs, kept.target, correspondence.inputs)
-        except NotTrainable:
-            continue  # what is left of the fold cannot carry a model: it says nothing about the error
-        held_out = samples.select(fold.held_out)
-        task = task_for(correspondence, kept, number, settings, held_out=held_out, palm=palm)
-        tasks.append(task)
-    return tasks
-
-
-def _without_wearings(
     correspondence: Correspondence,
     samples: Samples,
     wearings: Sequence[str],
     settings: TrainingSettings,
     palm: Samples | None,
-) -> list[FitTask]:
-    """Fits that have not seen some wearings; none without an error estimate."""
-    if settings.folds < 1:
-        return []
-    tasks, owner = [], np.array(wearings, dtype=object)[samples.take]
-    for number, group in enumerate(wearing_groups(wearings)):
-        is_left_out = np.isin(owner, group)
-        kept = samples_by(settings.method, samples.select(~is_left_out))
-        try:
-            check_samples(kept.inputs, kept.target, correspondence.inputs)
-        except NotTrainable:
-            continue  # what is left cannot carry a model: it says nothing about the error
-        if is_left_out.any():
-            fold, chosen = settings.folds + number, left_out_settings(settings)
-            tasks.append(task_for(correspondence, kept, fold, chosen, palm=palm, without=group))
-    return tasks
+) -> tuple[list[FitTask], list[FitTask]]:
+    """The fits with all samples and of each fold, and those that have not seen some wearings: none without an
+    error estimate."""
+
+    def kept_by(kept: np.ndarray) -> Samples:
+        return samples_by(settings.method, samples.select(kept))
+
+    def check_rest(kept: np.ndarray) -> None:
+        rest = kept_by(kept)
+        check_samples(rest.inputs, rest.target, correspondence.inputs)
+
+    tasks = [task_for(correspondence, samples, None, settings, palm=palm)]
+    folds = [fold.held_out for fold in folds_over_takes(samples.take, settings.folds)]
+    for number, mask in usable_folds(folds, check_rest):
+        held_out, kept = samples.select(mask), kept_by(~mask)
+        tasks.append(task_for(correspondence, kept, number, settings, held_out=held_out, palm=palm))
+    without, owner = [], np.array(wearings, dtype=object)[samples.take]
+    groups = wearing_groups(wearings) if settings.folds else []
+    for number, mask in usable_folds([np.isin(owner, group) for group in groups], check_rest):
+        if mask.any():
+            fold, chosen, kept = settings.folds + number, left_out_settings(settings), kept_by(~mask)
+            without.append(task_for(correspondence, kept, fold, chosen, palm=palm, without=groups[number]))
+    return tasks, without
 
 
 def task_for(

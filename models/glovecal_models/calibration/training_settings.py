@@ -1,13 +1,28 @@
-"""How to train: the choices a caller may make, with defaults that work."""
+"""How to train: the choices a caller may make, with defaults that work.
+
+How to train a model again: its effects, rotations, settings and repaired takes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
+from glovecal_models.calibration.added_effect import EffectRequest
+from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
+from glovecal_models.effects.base.effect import (
+    Effect,
+    RepairEffect,
+)
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.errors import BadInput
-from glovecal_models.regression.lmc_search import LmcOptimum
+from glovecal_models.regression.fast_lmc import LmcOptimum
+from glovecal_models.regression.kernel_candidates import CHOOSING
+from glovecal_models.regression.kernel_scores import kernel_of
+from glovecal_models.regression.regressor import RuleRegressor
+from glovecal_models.takes.take import Take
 
 Method = Literal[
     "raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr", "two_shapes", "template"
@@ -79,3 +94,61 @@ LEFT_OUT_SAMPLES = 500
 def left_out_settings(settings: TrainingSettings) -> TrainingSettings:
     """How the fits without a wearing are trained."""
     return replace(settings, samples=min(settings.samples, LEFT_OUT_SAMPLES))
+
+
+def requested_effects(model: CalibrationModel) -> tuple[EffectRequest, ...]:
+    """The effects a model has, as they would be asked for again."""
+    merged: dict[str, EffectRequest] = {}
+    for item in model.effects:
+        if item.of_wearings is not None and not item.of_wearings.are_trained:
+            continue  # training takes tell nothing of a wearing that only a quick check saw
+        before = merged.get(item.name)
+        rotations = item.active if before is None else (*before.rotations, *item.active)
+        settings = item.settings
+        if item.weights.shape[1]:
+            settings = item.correction.further.with_found({}, item.settings)
+        merged[item.name] = EffectRequest(item.effect, tuple(dict.fromkeys(rotations)), settings)
+    return tuple(merged.values())
+
+
+def trained_rotations(model: CalibrationModel) -> tuple[str, ...]:
+    """Rotations with a regressor of their own, no rule."""
+    return tuple(item.rotation for item in model.rotations if not isinstance(item.regressor, RuleRegressor))
+
+
+def repaired_takes(takes: Sequence[Take], wanted: Sequence[EffectRequest]) -> list[Take]:
+    """The takes with what their measurement needs: clocks on the frames' time, faulty pieces left out."""
+    result = list(takes)
+    for item in wanted:
+        if isinstance(item.effect, RepairEffect):
+            result = list(item.effect.repaired(result, item.settings))
+    return result
+
+
+def settings_of(model: CalibrationModel, settings: TrainingSettings | None) -> TrainingSettings:
+    """How the model was trained, as far as it tells; kernels that were chosen for it stay."""
+    settings = settings or TrainingSettings(method=model.method)  # pyright: ignore[reportArgumentType]
+    if settings.method not in CHOOSING:
+        return settings
+    kernels = {item.rotation: kernel_of(item.regressor) for item in model.rotations}
+    return replace(settings, kernels=tuple((name, kind) for name, kind in kernels.items() if kind))
+
+
+def declared_effects(model: CalibrationModel) -> list[Effect]:
+    """The declared effects that a model holds."""
+    found = {item.name: item.effect for item in model.effects if "declaration" in item.settings}
+    return list(found.values())
+
+
+def effect_named(model: CalibrationModel, name: str) -> Effect:
+    """The model's own declared effect of that name, else the catalogue's. Raises BadInput."""
+    own = {item.name: item for item in declared_effects(model)}
+    return own[name] if name in own else effect(name)
+
+
+def declaration_of(model: CalibrationModel, name: str) -> Mapping[str, Any] | None:
+    """The document that declares a model's effect, None for one of the catalogue."""
+    for item in model.effects:
+        if item.name == name and "declaration" in item.settings:
+            return item.settings["declaration"]
+    return None

@@ -13,34 +13,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.calibration.effect_fit import Optima, fit_with_effects, optima_of
-from glovecal_models.calibration.effect_request import EffectRequest
-from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.held_out_check import frame_errors_of
+from glovecal_models.calibration.effect_fit import optima_of
+from glovecal_models.calibration.leave_out import held_out_take_errors
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import (
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.training_settings import (
+    TrainingSettings,
     declared_effects,
     repaired_takes,
     requested_effects,
     settings_of,
     trained_rotations,
 )
-from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.ceiling.black_box import left_by_box
-from glovecal_models.ceiling.ceiling import Ceiling, Gain, is_gain, verdict_of
-from glovecal_models.ceiling.limits import CEILING_LIMITS, CeilingLimits
-from glovecal_models.ceiling.recorded_columns import (
+from glovecal_models.ceiling.black_box import (
     GROUPS,
     MOST_ROWS,
     ROW_EVERY,
     TakeColumns,
     exchange_order,
     exchanged,
+    left_by_box,
     own_averages,
     recorded_columns,
     smoothed_error,
 )
+from glovecal_models.ceiling.ceiling import CEILING_LIMITS, Ceiling, CeilingLimits, Gain, is_gain, verdict_of
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.progress import Cancel, Report, part, stop_if
@@ -48,6 +45,8 @@ from glovecal_models.takes.take import Take
 
 WORTH_CONTROLS = 0.005
 """Share of the squared error; a box that gains less needs no controls."""
+FOLDS = 4
+"""Takes are left out in so many parts: the box learns from the errors of every take."""
 MOST_OWN_SENSORS = 4
 SINGLE_POSES_S = 0.25
 """Between frames: further apart they are single poses, which have no history."""
@@ -80,6 +79,7 @@ def black_box_ceiling(
         names,
         wanted,
         settings,
+        folds=FOLDS,
         optima=optima_of(model),
         cancelled=cancelled,
         report=part(report, 0.0, 0.25, "held-out error"),
@@ -231,39 +231,6 @@ def _own_sensors(prepared: PreparedTakes, rotation: str) -> tuple[int, ...]:
     measuring = item.measuring_sensor
     names = item.sensors[:MOST_OWN_SENSORS] if measuring is None else (measuring,)
     return tuple(prepared.layout.sensors.index(name) for name in names)
-
-
-# The errors of a model's recipe on whole takes that its fit never saw, frame by frame.
-
-
-FOLDS = 4
-
-
-def held_out_take_errors(
-    takes: PreparedTakes,
-    rotations: Sequence[str],
-    wanted: Sequence[EffectRequest],
-    settings: TrainingSettings,
-    *,
-    optima: Optima = (),
-    cancelled: Cancel | None = None,
-    report: Report | None = None,
-) -> list[np.ndarray]:
-    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured.
-
-    ``optima`` as in ``fit_with_effects``. Raises NotTrainable, Cancelled.
-    """
-    found = [np.empty((0, 0))] * len(takes.takes)
-    folds = folds_over_takes(np.arange(len(takes.takes)), FOLDS)
-    for number, fold in enumerate(folds):
-        if report:
-            report(f"leaving out {fold.sentence}", number / len(folds))
-        held = np.flatnonzero(fold.held_out).tolist()
-        kept = takes.some(np.flatnonzero(~fold.held_out).tolist())
-        fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
-        for at, errors in zip(held, frame_errors_of(fit, takes.some(held), rotations, settings), strict=True):
-            found[at] = errors
-    return found
 
 
 # What the black box is asked of one rotation: rows of recorded columns, and the errors beside them.

@@ -1,4 +1,7 @@
-"""What a black box on everything recorded makes of a model's error: a verdict with an interval."""
+"""What a black box on everything recorded makes of a model's error: a verdict with an interval.
+
+When something is left to gain from what was recorded, and when nothing is.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,53 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from glovecal_models.ceiling.limits import CEILING_LIMITS, CeilingLimits
+from glovecal_models.limit import limit
 
 Verdict = Literal["gain", "none", "undecided"]
 RECIPE = 2
 """Rises when the same model and takes get another answer: results kept of an earlier one are not used."""
 EXACT_FLIPS = 14
 RANDOM_FLIPS = 20000
+
+
+@dataclass(frozen=True)
+class CeilingLimits:
+    """Of the verdict on the black-box ceiling."""
+
+    none_below: float = limit(
+        0.05,
+        "share of the RMSE",
+        "With the upper bound of the gain below this, nothing is left to gain.",
+        "Chosen: a fall that a user would not notice.",
+    )
+    gain_p_value: float = limit(
+        0.01,
+        "p value",
+        "Of the gain, by flipping the sign of whole takes; of a rotation, divided by their number.",
+        "Chosen.",
+    )
+    least_gain: float = limit(
+        0.02,
+        "share of the RMSE",
+        "A smaller gain is not told, however significant.",
+        "Chosen.",
+    )
+    most_by_take: float = limit(
+        0.5,
+        "share of a rotation's squared error",
+        "With more of it changing from take to take, it is not said that nothing is left to gain.",
+        "At most 0.35 in 8 simulated clean gloves, 0.66 to 0.84 in 15 with a cause that changes from take to"
+        " take at 1.3 noise floors (2026-11-22).",
+    )
+    fewest_takes: int = limit(
+        6,
+        "takes",
+        "With fewer there is no verdict.",
+        "Flipping the signs of five takes cannot give p below 0.03.",
+    )
+
+
+CEILING_LIMITS = CeilingLimits()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from glovecal_models.ceiling.answer import LeftToGain, PossibleGain
 from glovecal_models.ceiling.ceiling import Ceiling, Gain
 
 MOST_NAMED = 4
@@ -27,6 +28,25 @@ def ceiling_sentence(found: Ceiling) -> str:
             f" {_measurement(found)}"
         )
     return f"Whether anything is left to gain is undecided: {_why(found)}."
+
+
+def left_to_gain(found: Ceiling) -> LeftToGain:
+    """As answers tell it."""
+    return LeftToGain(
+        verdict=found.verdict,
+        sentence=ceiling_sentence(found),
+        overall=None if found.overall is None else _possible(found.overall),
+        rotations={name: _possible(gain) for name, gain in found.rotations.items()},
+        groups=found.groups,
+        unrecorded=found.unrecorded,
+        left_out=found.takes,
+    )
+
+
+def _possible(gain: Gain) -> PossibleGain:
+    return PossibleGain(
+        gain.rmse_deg, gain.ceiling_deg, gain.lowest_deg, gain.low_share, gain.high_share, gain.p_value
+    )
 
 
 def not_left_to_gain(found: Ceiling | None) -> list[str]:

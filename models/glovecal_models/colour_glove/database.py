@@ -23,9 +23,16 @@ from tempfile import mkdtemp
 import numba
 import numpy as np
 
-from glovecal_models.colour_glove.crop import BANDWIDTH_SD, SIZE, Window, shifted_window, voted
+from glovecal_models.colour_glove.crop import (
+    BANDWIDTH_SD,
+    CAP,
+    SIZE,
+    Window,
+    shifted_window,
+    transform_into,
+    voted,
+)
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, HandState
-from glovecal_models.colour_glove.image_distance import CAP, transform_into
 from glovecal_models.colour_glove.pattern import Pattern
 from glovecal_models.colour_glove.pose_set import low_dispersion, shape_features
 from glovecal_models.colour_glove.rasterise import z_buffer

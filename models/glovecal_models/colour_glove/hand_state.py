@@ -3,18 +3,21 @@
 26 degrees of freedom as in Wang & Popovic 2009, section 5.1. The wrist does not count: its angles are zero,
 so that the palm's frame is that of ``hand_skeleton`` (origin at the wrist, x to the fingers, y to the thumb
 of the right hand, z out of the back of the hand). Frame of a camera: x right, y down, z forward, mm.
+
+What is said about a hand's pose in one moment: the state, how sure each part of it is, what was seen.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import HAND_ROTATIONS, WRIST
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HAND_ROTATIONS, WRIST
+from glovecal_models.takes.camera_estimates import CameraEstimates, without_repeats
 
 FINGER_ROTATIONS: tuple[str, ...] = tuple(name for name in HAND_ROTATIONS if name not in WRIST)
 """The order of a state's angles: ``HAND_ROTATIONS`` without the wrist, 20."""
@@ -23,6 +26,9 @@ RANGE_DEG = np.array([ACTIVE_RANGE_DEG[name] for name in FINGER_ROTATIONS])
 DEGREES_OF_FREEDOM = len(FINGER_ROTATIONS) + 6
 _IS_ROTATION_WITHIN = 1e-6
 _SMALL_RAD, _NEARLY_OPPOSITE = 1e-6, -0.9
+STAGES = ("nearest", "blend", "ik", "dense")
+"""The nearest entry of the database; ten of them blended (section 4.5); inverse kinematics on the patches'
+centroids (section 5.3); refinement on the labels of all pixels (ours). Each starts from the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +55,6 @@ class HandState:
         error = np.abs(self.rotation @ self.rotation.T - np.eye(3)).max()
         if error > _IS_ROTATION_WITHIN or np.linalg.det(self.rotation) < 0:
             raise BadInput(f"rotation of a hand's state is no rotation matrix (off by {error:.2g})")
-
-    @classmethod
-    def from_vector(cls, vector: np.ndarray) -> HandState:
-        """From 26 numbers as ``vector`` gives them. Raises BadInput for another count."""
-        from scipy.spatial.transform import Rotation
-
-        vector = np.asarray(vector, dtype=float)
-        if vector.shape != (DEGREES_OF_FREEDOM,):
-            raise BadInput(f"a hand's state has {DEGREES_OF_FREEDOM} numbers, not shape {vector.shape}")
-        if not np.isfinite(vector).all():
-            raise BadInput(f"a hand's state is not finite: {vector}")
-        return cls(vector[:20], Rotation.from_rotvec(vector[20:23], degrees=True).as_matrix(), vector[23:])
 
     def vector(self) -> np.ndarray:
         """(26,): angles in degrees, rotation vector in degrees, position in mm."""
@@ -108,3 +102,51 @@ def _rotation_vector(turn: np.ndarray) -> np.ndarray:
 
         return Rotation.from_matrix(turn).as_rotvec()
     return np.array([x, y, z]) * (math.atan2(sine, cosine) / sine if sine > _SMALL_RAD else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseEstimate:
+    """Raises BadInput for arrays of other shapes and a stage that is none of ``STAGES``."""
+
+    state: HandState
+    """In the frame of the first camera."""
+    standard_deviation: np.ndarray
+    """(26,): angles in degrees, turn about the camera's axes in degrees, position in mm."""
+    accepted: np.ndarray
+    """(20,) bool, in the order of ``FINGER_ROTATIONS``: sure enough to be a reference."""
+    patches: tuple[int, ...]
+    """Patches (1 to 20) that at least one camera saw."""
+    disagreeing: float
+    """Share of the pixels of glove, seen or drawn, whose colour is not that of the estimate drawn: 0 to 1."""
+    stage: str
+
+    def __post_init__(self) -> None:
+        if self.standard_deviation.shape != (DEGREES_OF_FREEDOM,):
+            raise BadInput(f"standard deviations have shape {self.standard_deviation.shape}, expected (26,)")
+        if self.accepted.shape != (len(FINGER_ROTATIONS),):
+            raise BadInput(f"accept flags have shape {self.accepted.shape}, expected (20,)")
+        if self.stage not in STAGES:
+            raise BadInput(f"stage {self.stage!r} is none of {', '.join(STAGES)}")
+
+
+def camera_estimates(
+    seconds: Sequence[float], poses: Sequence[PoseEstimate | None], *, simulated: bool
+) -> CameraEstimates:
+    """Estimates over time as a take's reference asks for them; ``seconds`` (F,): the middle of each exposure.
+
+    Where no hand was found (None) there are no angles. Frames that are stamped no later than one before are
+    left out. ``simulated``: the pictures were rendered. Raises BadInput where nothing is left.
+    """
+    time = np.asarray(seconds, dtype=float)
+    kept = np.flatnonzero(without_repeats(time))
+    angles, deviations = np.full((2, len(kept), len(FINGER_ROTATIONS)), np.nan)
+    accepted, patches = np.zeros(angles.shape, dtype=bool), np.zeros(len(kept), dtype=int)
+    for row, place in enumerate(kept.tolist()):
+        pose = poses[place]
+        if pose is not None:
+            angles[row] = pose.state.angles_deg
+            deviations[row] = pose.standard_deviation[: len(FINGER_ROTATIONS)]
+            accepted[row], patches[row] = pose.accepted, len(pose.patches)
+    return CameraEstimates(
+        time[kept], FINGER_ROTATIONS, angles, deviations, accepted, patches, simulated=simulated
+    )

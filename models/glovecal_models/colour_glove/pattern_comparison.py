@@ -13,10 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
+from glovecal_models.colour_glove.crop import distances
 from glovecal_models.colour_glove.database import orientations, palm_centre, rendered_views, view_state
-from glovecal_models.colour_glove.image_distance import distances
-from glovecal_models.colour_glove.palette import COLOUR_NAMES
-from glovecal_models.colour_glove.pattern import PATCHES, Pattern, glove_pattern, printed_pattern
+from glovecal_models.colour_glove.pattern import (
+    COLOUR_NAMES,
+    PATCHES,
+    Pattern,
+    glove_pattern,
+    printed_pattern,
+)
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
 from glovecal_models.documents import read_json

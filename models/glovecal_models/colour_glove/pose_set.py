@@ -8,15 +8,12 @@ distance of their skins' vertices, with the palm held still.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, RANGE_DEG, HandState
-from glovecal_models.colour_glove.skin import HandSkin, configured, posed
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, RANGE_DEG
+from glovecal_models.colour_glove.skin import HandSkin, configured
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.rotations import FINGERS, completed
-from glovecal_models.takes.take import Take
+from glovecal_models.hand.rotations import FINGERS
 
 PAPER_COUNT = 18_000
 POSE_NOISE_DEG = 5.0
@@ -70,24 +67,6 @@ def generated_poses(count: int = PAPER_COUNT, *, seed: int = 1) -> np.ndarray:
     return np.clip(mixed + rng.normal(0.0, POSE_NOISE_DEG, mixed.shape), *RANGE_DEG.T)
 
 
-def poses_of_takes(takes: Sequence[Take]) -> np.ndarray:
-    """Configurations (N, 20) that takes measured: what they lack follows its rule or rests.
-
-    Raises BadInput when no take has a measured rotation of the hand.
-    """
-    found = []
-    for take in takes:
-        known = [name for name in take.rotations if name in FINGER_ROTATIONS]
-        columns = [take.rotations.index(name) for name in known]
-        measured = take.reference[:, columns]
-        measured = measured[np.isfinite(measured).any(axis=1)]
-        found.append(np.clip(completed(known, measured, FINGER_ROTATIONS), *RANGE_DEG.T))
-    poses = np.concatenate(found) if found else np.empty((0, len(FINGER_ROTATIONS)))
-    if not len(poses):
-        raise BadInput("none of these takes has a measured rotation of the hand")
-    return poses
-
-
 def shape_features(
     skin: HandSkin, poses_deg: np.ndarray, *, dimensions: int = 40, every: int = 8
 ) -> np.ndarray:
@@ -121,12 +100,6 @@ def low_dispersion(features: np.ndarray, count: int) -> tuple[np.ndarray, np.nda
         nearest = np.minimum(nearest, ((features - features[chosen[-1]]) ** 2).sum(axis=1))
         dispersion.append(nearest.max())
     return np.array(chosen), np.sqrt(dispersion)
-
-
-def vertex_rms_mm(skin: HandSkin, first: HandState, second: HandState) -> float:
-    """Root mean square distance of two hands' vertices, where they are."""
-    difference = posed(skin, first) - posed(skin, second)
-    return float(np.sqrt((difference**2).sum(axis=1).mean()))
 
 
 def _vertices(skin: HandSkin, poses: np.ndarray, every: int) -> np.ndarray:

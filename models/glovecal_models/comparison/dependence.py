@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.where.answer import Dependence
 
 POWER_ON = "power_on_s"
 """The context column of seconds since the glove was switched on."""
@@ -122,29 +124,11 @@ def _context(item: TakeResiduals, name: str) -> np.ndarray:
     return np.asarray(item.take.context.get(name, unknown), dtype=float)
 
 
-@dataclass(frozen=True)
-class Dependence:
-    """The error of one rotation against one covariate."""
-
-    covariate: str
-    unit: str
-    phrase: str
-    edges: np.ndarray
-    """Bin edges, (B + 1,), in the covariate's unit."""
-    mean_deg: np.ndarray
-    """Mean error in each bin, (B,)."""
-    count: np.ndarray
-    """Frames in each bin, (B,)."""
-    chance_deg: np.ndarray
-    """How far 95 % of the shifts take a bin's mean from the mean of all, (B,); NaN: not tested."""
-    explained_deg: float
-    """Root mean square of the bin means' deviation from their mean: what this column explains, degrees."""
-    p_value: float
-    """Share of shifts that explain as much (p value); 1 where it could not be tested."""
-
-
 def dependence(
-    errors: tuple[np.ndarray, ...], covariate: Covariate, generator: np.random.Generator
+    errors: tuple[np.ndarray, ...],
+    covariate: Covariate,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
 ) -> Dependence | None:
     """``errors``: for each take (N,), degrees. None when the covariate takes fewer than two values."""
     pairs = _known_pairs(errors, covariate)
@@ -159,9 +143,13 @@ def dependence(
     spread = float(np.sqrt(np.average((mean - error.mean()) ** 2, weights=count)))
     series = [_thinned(e - error.mean(), _bin(v, edges)) for e, v in pairs]
     chance, p_value = _against_shifts(series, bins, generator)
+    reach = [None if np.isnan(value) else value for value in chance.tolist()]
+    is_significant = p_value <= limits.structure_p_value
+    matters = bool(spread**2 >= limits.structure_share * np.nanmean(np.concatenate(errors) ** 2))
     return Dependence(
-        covariate.name, covariate.unit, covariate.phrase, edges, mean, count, chance, spread, p_value
-    )
+        covariate.name, covariate.unit, covariate.phrase, edges.tolist(), mean.tolist(), count.tolist(),
+        reach, spread, p_value, is_significant, is_significant and matters,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.comparison.dependence import Covariate, Dependence, covariates, dependence
+from glovecal_models.comparison.dependence import Covariate, covariates, dependence
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.where.answer import Dependence
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.errors import BadInput
 
@@ -71,7 +72,7 @@ def effect_picture(found: Residuals, effect: Effect, rotation: str) -> EffectPic
     """Raises BadInput for a rotation that no take measured, and a column that was not recorded."""
     if rotation not in found.measured_rotations:
         raise BadInput(f"none of the takes measured {rotation}")
-    return _PICTURES[effect.shown_over](found, effect, rotation)
+    return _PICTURES[effect.about.shown_over](found, effect, rotation)
 
 
 def _errors(found: Residuals, rotation: str) -> tuple[np.ndarray, ...]:
@@ -89,14 +90,17 @@ def _over_angle(found: Residuals, effect: Effect, rotation: str) -> EffectPictur
 
 def _over_context(found: Residuals, effect: Effect, rotation: str) -> EffectPicture:
     for one in covariates(found, rotation):
-        if any(effect.may_show_in(one.name) or one.name == f"context {name}" for name in effect.context):
+        if any(
+            effect.about.may_show_in(one.name, effect.context) or one.name == f"context {name}"
+            for name in effect.context
+        ):
             return _over(found, rotation, one)
     raise BadInput(f"no context column c.{effect.context[0]} was recorded")
 
 
 def _over_neighbour(found: Residuals, effect: Effect, rotation: str) -> EffectPicture:
     """Over the sensor that explains most; never that of the joint itself, where it has one of its name."""
-    wanted = {f"sensor {name}" for name in effect.neighbours}
+    wanted = {f"sensor {name}" for name in effect.about.neighbours}
     every = [one for one in covariates(found, rotation) if one.name.startswith("sensor ")]
     every = [one for one in every if one.name in wanted or (not wanted and one.name != f"sensor {rotation}")]
     errors = _errors(found, rotation)
@@ -330,12 +334,19 @@ def _means(name: str, errors: tuple[np.ndarray, ...], column: Covariate) -> Pict
     at = np.array([_middle(value[where == number], tested, number) for number in range(len(tested.mean_deg))])
     step = max(1, -(-len(error) // MOST_POINTS))
     return PictureSeries(
-        name, at, tested.mean_deg, low, high, tested.chance_deg, value[::step], error[::step]
+        name,
+        at,
+        np.array(tested.mean_deg),
+        low,
+        high,
+        np.array(tested.chance_deg, dtype=float),
+        value[::step],
+        error[::step],
     )
 
 
 def _middle(values: np.ndarray, tested: Dependence, number: int) -> float:
-    return float(np.mean(values)) if len(values) else float(tested.edges[number : number + 2].mean())
+    return float(np.mean(values)) if len(values) else float(np.mean(tested.edges[number : number + 2]))
 
 
 def _quantiles(error: np.ndarray, where: np.ndarray, tested: Dependence, share: float) -> np.ndarray:

@@ -2,23 +2,42 @@
 
 Each joint's noise floor moves the tip by its column of the Jacobian; the joints' noises are assumed
 independent, so their squares add up. Neighbours that share a sensor's noise are not quite independent.
+
+A prediction and its measurement as two whole hands, frame by frame.
+
+Only what was both predicted and measured may differ between the two. Every other rotation is taken equal in
+both: as measured, else as predicted, else by the hand's own rules and rest. The wrist moves the whole hand
+and is left straight: fingertips are seen from the palm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.comparison.fingertip_answer import (
+    FingertipErrors,
+    FingertipFloor,
+    HandLines,
+    TipErrors,
+    WorstTip,
+)
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.hand_poses import HandPoses, compared_rotations, hand_poses, tips_mm
-from glovecal_models.comparison.residuals import Residuals
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
-from glovecal_models.hand.rotations import FINGERS, PALM
+from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST, completed
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 
+NEEDED = {
+    "T": ("T_TMC", "TI_ABD", "T_MCP", "T_IP"),
+    **{finger: (f"{finger}_MCP", f"{finger}_PIP") for finger in "IMRP"},
+}
+"""A fingertip counts in frames where these were predicted and measured."""
+FRAMES_AT_ONCE = 4096
+_WRIST = [HAND_ROTATIONS.index(name) for name in WRIST]
 MOST_FRAMES = 3000
 """Frames that the floor is averaged over, spread over all."""
 _ENDS = ("floor_deg", "low_deg", "high_deg")
@@ -27,21 +46,80 @@ THUMB, INDEX = 0, 1
 
 
 @dataclass(frozen=True)
-class FingertipFloor:
-    """With the interval that the ends of the joints' 95 % intervals give."""
+class HandPoses:
+    """N frames, and R rotations in the order of the hand's, which ``compared_rotations`` tells."""
 
-    floor_mm: float
-    low_mm: float
-    high_mm: float
-    is_lower_bound: bool
-    """That of some joint is one: noise with a memory is not in it."""
-    is_reliable: bool = True
-    """That of every joint is."""
+    predicted: np.ndarray
+    """(N, R), degrees."""
+    measured: np.ndarray
+    """(N, R), degrees."""
+    compared: np.ndarray
+    """(N, R): predicted and measured; elsewhere both hands are equal."""
+    counts: np.ndarray
+    """(N, 5): fingertips that count, in the order of ``FINGERS``."""
+    take: np.ndarray
+    """(N,): index into the residuals' takes."""
+    time_s: np.ndarray
+    """(N,): since the start of the take."""
 
-    def beside(self, rmse_mm: float) -> FingertipFloor:
-        """The floor of an error of ``rmse_mm``, never above it."""
-        ends = {name: min(getattr(self, name), rmse_mm) for name in ("floor_mm", "low_mm", "high_mm")}
-        return replace(self, **ends, is_reliable=self.is_reliable and self.low_mm <= rmse_mm)
+    def every(self, most: int) -> HandPoses:
+        """At most ``most`` frames, evenly spread."""
+        return self.at(slice(None, None, max(1, -(-len(self.time_s) // most))))
+
+    def at(self, rows: slice | np.ndarray) -> HandPoses:
+        """Some frames: a slice, a mask or indexes."""
+        return HandPoses(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def compared_rotations(found: Residuals) -> tuple[str, ...]:
+    """Of a hand whose palm arches where its arch was both predicted and measured, else of a rigid one."""
+    arches = PALM in found.rotations and any(
+        np.isfinite(item.take.reference_at_frames((PALM,))).any() for item in found.takes
+    )
+    return ARCHING_ROTATIONS if arches else HAND_ROTATIONS
+
+
+def hand_poses(found: Residuals) -> HandPoses | None:
+    """Both hands, where a fingertip counts; None where no finger's chain was predicted and measured."""
+    hand = compared_rotations(found)
+    takes = [poses_of_take(item, found.rotations, index, hand) for index, item in enumerate(found.takes)]
+    counting = [one.at(np.flatnonzero(one.counts.any(axis=1))) for one in takes]
+    names = HandPoses.__dataclass_fields__
+    joined = HandPoses(*(np.concatenate([getattr(one, name) for one in counting]) for name in names))
+    return joined if len(joined.time_s) else None
+
+
+def poses_of_take(
+    item: TakeResiduals, rotations: tuple[str, ...], index: int = 0, hand: tuple[str, ...] = HAND_ROTATIONS
+) -> HandPoses:
+    """Every frame of a take, those too in which no fingertip counts; ``rotations``: of the residuals,
+    ``hand``: of the hand."""
+    measured = item.take.reference_at_frames(hand)
+    predicted = np.full_like(measured, np.nan)
+    for column, name in enumerate(hand):
+        if name in rotations:
+            angle = item.predicted[:, rotations.index(name)]
+            predicted[:, column] = np.where(np.isfinite(angle), angle, np.nan)
+    compared = np.isfinite(measured) & np.isfinite(predicted)
+    compared[:, _WRIST] = False
+    places = [[HAND_ROTATIONS.index(name) for name in NEEDED[finger]] for finger in FINGERS]
+    counts = np.column_stack([compared[:, needed].all(axis=1) for needed in places])
+    whole = completed(hand, np.where(np.isfinite(measured), measured, predicted), hand)
+    whole[:, _WRIST] = 0.0
+    time = item.take.time_s - item.take.time_s[:1]
+    return HandPoses(
+        np.where(compared, predicted, whole), whole, compared, counts, np.full(len(time), index), time
+    )
+
+
+def tips_mm(skeleton: Skeleton, angles_deg: np.ndarray) -> np.ndarray:
+    """Fingertips (N, 5, 3) of any number of frames."""
+    return np.concatenate([forward_kinematics(skeleton, block).tips_mm for block in _blocks(angles_deg)])
+
+
+def _blocks(angles: np.ndarray) -> Iterator[np.ndarray]:
+    for start in range(0, max(len(angles), 1), FRAMES_AT_ONCE):
+        yield angles[start : start + FRAMES_AT_ONCE]
 
 
 class CarriedFloors:
@@ -100,51 +178,6 @@ class CarriedFloors:
         )
 
 
-@dataclass(frozen=True)
-class TipErrors:
-    """Distances between where a fingertip is predicted and where it was measured, in mm."""
-
-    count: int
-    """Frames, or frames times fingers."""
-    rmse_mm: float
-    percentile_95_mm: float
-    """95 % of the distances are at or below this."""
-    baseline_mm: float
-    """The error (RMSE) of always answering each rotation's mean angle."""
-    floor: FingertipFloor | None
-    """How small the RMSE can get; None where some joint's floor is unknown."""
-    assumed_equal: tuple[str, ...]
-    """Rotations of the chain that were not compared in all of these frames: there they do not count."""
-
-
-@dataclass(frozen=True)
-class WorstTip:
-    """The frame in which a fingertip is farthest off, and the two hands in it."""
-
-    finger: str
-    error_mm: float
-    take: str
-    time_s: float
-    """Since the start of the take."""
-    measured_deg: dict[str, float]
-    predicted_deg: dict[str, float]
-
-
-@dataclass(frozen=True)
-class FingertipErrors:
-    """Seen from the palm: the wrist does not count."""
-
-    hand_length_mm: float
-    is_assumed: bool
-    """Nobody measured this hand: the errors are those of a hand of this length."""
-    overall: TipErrors
-    fingers: dict[str, TipErrors]
-    """``thumb`` to ``pinky``, those whose chain was predicted and measured."""
-    thumb_index: TipErrors | None
-    """Of the distance between the tips of thumb and index finger; None where one of them does not count."""
-    worst: WorstTip
-
-
 def fingertip_errors(
     found: Residuals,
     floors: Mapping[str, NoiseFloor | None],
@@ -174,7 +207,7 @@ def fingertip_errors(
     sizes = skeleton.dimensions
     return FingertipErrors(
         sizes.hand_length_mm, sizes.is_assumed, overall, fingers, thumb_index,
-        _worst(off, poses, found, skeleton.rotations),
+        _worst(off, poses, found, skeleton),
     )  # fmt: skip
 
 
@@ -228,11 +261,23 @@ def _assumed_equal(skeleton: Skeleton, poses: HandPoses, tips: Sequence[int]) ->
     return tuple(name for name in skeleton.rotations if name in found)
 
 
-def _worst(off: np.ndarray, poses: HandPoses, found: Residuals, hand: Sequence[str]) -> WorstTip:
+def _worst(off: np.ndarray, poses: HandPoses, found: Residuals, skeleton: Skeleton) -> WorstTip:
     frame, tip = np.unravel_index(np.nanargmax(off), off.shape)
     take = found.takes[poses.take[frame]].take.name
-    measured, predicted = (
-        dict(zip(hand, angles[frame].tolist(), strict=True)) for angles in (poses.measured, poses.predicted)
-    )
+    both = [angles[frame] for angles in (poses.measured, poses.predicted)]
+    measured, predicted = (dict(zip(skeleton.rotations, one.tolist(), strict=True)) for one in both)
+    lines = [_lines(skeleton, one) for one in both]
     error, time = float(off[frame, tip]), float(poses.time_s[frame])
-    return WorstTip(TIPS[tip], error, take, time, measured, predicted)
+    return WorstTip(TIPS[tip], error, take, time, measured, predicted, *lines)
+
+
+def _lines(skeleton: Skeleton, angles_deg: np.ndarray) -> HandLines:
+    """Palm to tip of each finger, and across the knuckles, of one frame (R,)."""
+    frames = forward_kinematics(skeleton, angles_deg[None])
+    fingers = [
+        np.vstack([frames.joints_mm[0, list(skeleton.carrying(last))], frames.tips_mm[0, tip]])
+        for tip, last in enumerate(skeleton.tip_joints)
+    ]
+    names = [joint.name for joint in skeleton.joints]
+    knuckles = frames.joints_mm[0, [names.index(f"{finger}_MCP") for finger in "IMRP"]]
+    return [[(x, y, z) for x, y, z in line.round(2).tolist()] for line in (*fingers, knuckles)]

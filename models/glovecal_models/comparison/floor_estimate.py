@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+
+from glovecal_models.presentation.document import answer
 
 How = Literal[
     "still hand", "still joint", "repeated poses", "spectrum", "frame to frame", "near readings", "stated",
@@ -19,31 +21,49 @@ LOWER_BOUNDS: tuple[How, ...] = ("spectrum", "frame to frame")
 RESAMPLES = 500
 
 
-@dataclass(frozen=True)
+@answer
 class NoiseFloor:
     """The floor of one rotation with its 95 % interval, degrees."""
 
     floor_deg: float
+    """How small an error can get on these measurements."""
     low_deg: float
+    """95 % interval, from resampled pieces."""
     high_deg: float
     prediction_deg: float
-    """What the prediction alone jitters by; the reference is the rest."""
+    """The part that is the prediction's own jitter; the reference is the rest."""
     how: How
+    """The best first. stated: what the reference states of itself is larger than any of these."""
     pieces: int
     """Holds, repeats or blocks of time that it was pooled from, and resampled for the interval."""
-    reasons: tuple[str, ...] = ()
+    reasons: Sequence[str] = ()
     """Why it is not reliable, each as the end of a sentence; none where it is."""
     estimate_deg: float | None = None
     """The estimate itself, where it lies above the error beside which the floor stands."""
     reference_deg: float | None = None
-    """RMS of the standard deviations that the reference states; None where it states none."""
-    is_lower_bound: bool = field(init=False)
-    """Noise with a memory is not in it."""
-    is_reliable: bool = field(init=False)
+    """RMS of the standard deviations that a camera states; null: none are stated."""
+    is_lower_bound: bool = False
+    """Autocorrelated noise is not included."""
+    is_reliable: bool = True
+    """Whether nothing speaks against it."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "is_lower_bound", self.how in LOWER_BOUNDS)
         object.__setattr__(self, "is_reliable", not self.reasons)
+
+    @property
+    def ends(self) -> tuple[float, float, float]:
+        """The floor, then its interval."""
+        return self.floor_deg, self.low_deg, self.high_deg
+
+    @property
+    def with_interval(self) -> str:
+        return f"{self.floor_deg:.2f} ({self.low_deg:.2f}-{self.high_deg:.2f})"
+
+    @property
+    def long_text(self) -> str:
+        least = "at least " if self.is_lower_bound else ""
+        return f"{least}{self.with_interval}{'' if self.is_reliable else ', not reliable'}"
 
     def with_stated(self, reference_deg: float) -> NoiseFloor:
         """The floor of angles whose reference states ``reference_deg``: never below it. Errors of a camera
@@ -75,6 +95,23 @@ class NoiseFloor:
             reasons=reasons,
             estimate_deg=estimate,
         )
+
+
+def interval_text(floor: NoiseFloor | None) -> str | None:
+    """As a cell has it: ">0.50" for a lower bound, "0.45-0.55?" for one that is not reliable."""
+    if floor is None:
+        return None
+    doubt = "" if floor.is_reliable else "?"
+    if floor.is_lower_bound:
+        return f">{floor.floor_deg:.2f}{doubt}"
+    return f"{floor.low_deg:.2f}-{floor.high_deg:.2f}{doubt}"
+
+
+def floor_text(floor: NoiseFloor, digits: int = 2) -> str:
+    """A floor in degrees and how far it can be trusted, as it stands behind "noise floor"."""
+    bound = "lower bound " if floor.is_lower_bound else ""
+    doubt = f", not reliable: {'; '.join(floor.reasons)}" if floor.reasons else ""
+    return f"{bound}{floor.floor_deg:.{digits}f}{doubt}"
 
 
 def pooled(

@@ -31,9 +31,15 @@ from functools import cached_property
 import numpy as np
 
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum, error_spectrum
-from glovecal_models.comparison.floor_doubts import clock_doubts, hold_doubts, slow_sampling
 from glovecal_models.comparison.floor_estimate import How, NoiseFloor, pooled, stated_floor
-from glovecal_models.comparison.holds import Hold, from_repeated_poses, holds
+from glovecal_models.comparison.holds import (
+    Hold,
+    clock_doubts,
+    from_repeated_poses,
+    hold_doubts,
+    holds,
+    slow_sampling,
+)
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.takes.take import Take

@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
+from math import comb
 
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.samples import require_layout
-from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.effects.base.effect import RepairEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
+
+MOST_PARTITIONS = 2000
 
 
 @dataclass(frozen=True)
@@ -94,16 +98,18 @@ def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
     for take in takes:
         require_layout(take, model.layout)
         given = take
-        repairs = [(item.effect, item.settings) for item in model.effects if item.effect.kind == "repair"]
+        repairs = [
+            (each, item.settings) for item in model.effects if isinstance(each := item.effect, RepairEffect)
+        ]
         for effect, settings in repairs:
-            if isinstance(effect, SignatureEffect) and not effect.needs_prediction:
+            if effect.by_prediction is None:
                 take = effect.repaired([take], settings)[0]
         excluded = () if take is given else _excluded(given, take, names)
         index = [take.sensors.index(name) for name in model.layout.sensors]
         angles = predictor.predict_take(take.time_s, take.readings[:, index], take.context, take.wearing)
         for effect, settings in repairs:
-            if isinstance(effect, SignatureEffect) and effect.needs_prediction:
-                take = effect.repaired_to(take, settings, names, angles.mean)
+            if effect.by_prediction is not None:
+                take = effect.by_prediction.repaired_to(take, settings, names, angles.mean)
         found.append(
             TakeResiduals(
                 take,
@@ -131,3 +137,55 @@ def _of_measurement(sd: np.ndarray, take: Take, rotations: Sequence[str]) -> np.
 def _excluded(given: Take, kept: Take, rotations: Sequence[str]) -> tuple[int, ...]:
     counts = [np.isfinite(take.reference_at_frames(rotations)).sum(axis=0) for take in (given, kept)]
     return tuple(int(count) for count in np.maximum(counts[0] - counts[1], 0))
+
+
+def partitions(counts: tuple[int, ...]) -> int:
+    """Distinct ways to split the takes into groups of these sizes, groups of equal size not told apart."""
+    left, ways = sum(counts), 1
+    for count in counts:
+        ways *= comb(left, count)
+        left -= count
+    for size in set(counts):
+        same = counts.count(size)
+        for number in range(2, same + 1):
+            ways //= number
+    return ways
+
+
+def permutations(
+    owners: np.ndarray, counts: tuple[int, ...], generator: np.random.Generator
+) -> list[np.ndarray]:
+    """All other partitions when they are few, else many random ones, each at most once."""
+    found: dict[bytes, np.ndarray] = {}
+    if len(counts) == 2 and partitions(counts) <= MOST_PARTITIONS:
+        first = np.array(list(combinations(range(len(owners)), counts[0])))
+        drawn = np.ones((len(first), len(owners)), dtype=int)
+        np.put_along_axis(drawn, first, 0, axis=1)
+    else:
+        drawn = np.array([generator.permutation(owners) for _ in range(2 * MOST_PARTITIONS)])
+    for permuted, partition in zip(drawn, _partitions_of(drawn), strict=True):
+        found[partition.tobytes()] = permuted
+    found.pop(_partitions_of(owners[None])[0].tobytes(), None)
+    return list(found.values())[:MOST_PARTITIONS]
+
+
+def permuted_sessions(owners: np.ndarray, most: int, generator: np.random.Generator) -> list[np.ndarray]:
+    """Up to ``most`` other ways to deal takes to wearings of the same sizes, each at most once."""
+    counts = tuple(np.bincount(owners).tolist())
+    found = permutations(owners, counts, generator)
+    return [found[i] for i in generator.permutation(len(found))[:most]]
+
+
+def _partitions_of(owners: np.ndarray) -> np.ndarray:
+    """``partition_of`` each row of (D, T), whose numbers are below T."""
+    numbers = np.arange(owners.shape[1])
+    is_owner = owners[:, None, :] == numbers[None, :, None]
+    first = np.where(is_owner.any(axis=2), is_owner.argmax(axis=2), owners.shape[1])
+    rank = np.argsort(np.argsort(first, axis=1, kind="stable"), axis=1)
+    return np.take_along_axis(rank, owners, axis=1)
+
+
+def partition_of(owners: np.ndarray) -> tuple[int, ...]:
+    """The same for partitions that differ only in the groups' names."""
+    names: dict[int, int] = {}
+    return tuple(names.setdefault(int(owner), len(names)) for owner in owners)

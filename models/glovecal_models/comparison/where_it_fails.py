@@ -1,103 +1,77 @@
-"""Where a model fails: noise floor, what the error depends on, wearings, worst stretches."""
+"""Where a model fails: noise floor, what the error depends on, wearings, worst stretches.
+
+Does the error change from one wearing to the next by more than from take to take?
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.comparison.dependence import Dependence, covariates, dependence
+from glovecal_models.comparison.dependence import covariates, dependence
 from glovecal_models.comparison.error_spectrum import ErrorSpectrum
-from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.noise_floor import RotationNoise, is_at_floor, rotation_noise
-from glovecal_models.comparison.residuals import Residuals, TakeResiduals
-from glovecal_models.comparison.wearings import WearingErrors, wearing_errors
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals, partitions, permutations
+from glovecal_models.comparison.where.answer import (
+    RotationFindings,
+    SlowShare,
+    Stretch,
+    WearingErrors,
+    WhereItFails,
+)
 
 STRETCH_S = 1.0
 MOST = 5
 
 
-@dataclass(frozen=True)
-class SlowShare:
-    """Share of an error's variance below 1 Hz, with its 95 % interval."""
-
-    share: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class RotationFindings:
-    """One rotation: how far from its floor, and what its error depends on."""
-
-    rotation: str
-    rmse_deg: float
-    bias_deg: float
-    floor: NoiseFloor | None
-    other_floors: tuple[NoiseFloor, ...]
-    """Less good estimates of the floor."""
-    slow: SlowShare | None
-    """None: too little was measured without a gap."""
-    dependences: tuple[Dependence, ...]
-    """Every column tested, the one that explains most first."""
-    wearings: WearingErrors | None
-    limits: ComparisonLimits = COMPARISON_LIMITS
-
-    @property
-    def is_near_floor(self) -> bool:
-        """The error is no larger than the noise floor, within its interval."""
-        return is_at_floor(self.rmse_deg, self.floor, self.limits)
-
-    @property
-    def is_jittery(self) -> bool:
-        """The prediction jitters by more than the reference's noise accounts for."""
-        return _is_jittery(self.floor, self.limits)
-
-    @property
-    def is_own_jitter(self) -> bool:
-        """The error is no larger than the noise floor and the prediction's own jitter together."""
-        if self.floor is None or not self.is_jittery:
-            return False
-        most = float(np.hypot(self.floor.high_deg, self.floor.prediction_deg))
-        return self.rmse_deg <= self.limits.at_floor_times * most
-
-    @property
-    def times_floor(self) -> float | None:
-        """The error over its noise floor; None where that is unknown, not reliable or a lower bound."""
-        floor = self.floor
-        if floor is None or floor.is_lower_bound or not floor.is_reliable or floor.floor_deg <= 0:
-            return None
-        return self.rmse_deg / floor.floor_deg
-
-    @property
-    def is_at_floor(self) -> bool:
-        """Only noise remains, and it is not the prediction's own."""
-        return self.is_near_floor and not self.is_jittery
-
-    def is_structure(self, item: Dependence) -> bool:
-        """Whether one of them is significant, and large enough to matter."""
-        return is_structure(item, self.rmse_deg, self.limits)
-
-    @property
-    def structure(self) -> tuple[Dependence, ...]:
-        """Significant dependences, the largest first."""
-        return tuple(item for item in self.dependences if self.is_structure(item))
+def wearing_errors(
+    found: Residuals,
+    rotation: str,
+    generator: np.random.Generator,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> WearingErrors | None:
+    """None with fewer than two wearings in which the rotation was measured."""
+    column = found.column(rotation)
+    means, labels = [], []
+    for item in found.takes:
+        error = item.error[:, column]
+        if np.isfinite(error).any():
+            means.append(float(np.nanmean(error)))
+            labels.append(item.take.wearing)
+    names = tuple(dict.fromkeys(labels))
+    if len(names) < 2:
+        return None
+    values, owners = np.array(means), np.array([names.index(label) for label in labels])
+    each = tuple(float(values[owners == i].mean()) for i in range(len(names)))
+    counts = tuple(int((owners == i).sum()) for i in range(len(names)))
+    p_value = _p_value(values, owners, counts, generator, limits.wearing_fewest_deals)
+    spread = float(np.std(each))
+    is_significant = p_value is not None and p_value <= limits.wearing_p_value
+    return WearingErrors(rotation, names, each, counts, spread, p_value, is_significant)
 
 
-@dataclass(frozen=True)
-class WhereItFails:
-    """The answer for all rotations, the one farthest above its floor first."""
+def _p_value(
+    values: np.ndarray,
+    owners: np.ndarray,
+    counts: tuple[int, ...],
+    generator: np.random.Generator,
+    fewest: int,
+) -> float | None:
+    """Over distinct permutations without the true one, which random draws would repeat."""
+    if partitions(counts) < fewest or min(counts) < 2:
+        return None
+    true = _spread(values, owners)
+    others = [_spread(values, permuted) for permuted in permutations(owners, counts, generator)]
+    return (1 + sum(other >= true - 1e-12 for other in others)) / (1 + len(others))
 
-    rotations: tuple[RotationFindings, ...]
-    stretches: tuple[Stretch, ...]
 
-
-def is_structure(item: Dependence, rmse_deg: float, limits: ComparisonLimits = COMPARISON_LIMITS) -> bool:
-    """Whether a dependence is significant, and large enough to matter."""
-    matters = item.explained_deg**2 >= limits.structure_share * rmse_deg**2
-    return item.p_value <= limits.structure_p_value and matters
+def _spread(values: np.ndarray, owners: np.ndarray) -> float:
+    """Between-wearing sum of squares."""
+    sums, counts = np.bincount(owners, values - values.mean()), np.bincount(owners)
+    return float(np.sum(sums**2 / counts))
 
 
 def where_it_fails(
@@ -124,7 +98,7 @@ def _findings(
 ) -> RotationFindings:
     column = found.column(rotation)
     errors = tuple(item.error[:, column] for item in found.takes)
-    tested = [dependence(errors, covariate, generator) for covariate in covariates(found, rotation)]
+    tested = [dependence(errors, item, generator, limits) for item in covariates(found, rotation)]
     ranked = sorted((item for item in tested if item is not None), key=lambda item: -item.explained_deg)
     every = np.concatenate(errors)
     rmse, bias = float(np.sqrt(np.nanmean(every**2))), float(np.nanmean(every))
@@ -132,7 +106,9 @@ def _findings(
     floors = [one.beside(rmse) for one in noise.floors]
     floor, others = (floors[0] if floors else None), tuple(floors[1:])
     wearings = wearing_errors(found, rotation, generator, limits)
-    return RotationFindings(rotation, rmse, bias, floor, others, slow, tuple(ranked), wearings, limits)
+    return _judged(
+        RotationFindings(rotation, rmse, bias, floor, others, slow, tuple(ranked), wearings), limits
+    )
 
 
 def _slow_share(spectrum: ErrorSpectrum | None) -> SlowShare | None:
@@ -146,30 +122,27 @@ def _above_floor(item: RotationFindings) -> float:
     return item.rmse_deg**2 - floor**2
 
 
-def _is_jittery(floor: NoiseFloor | None, limits: ComparisonLimits) -> bool:
-    """Whether the prediction jitters by more than the reference's noise accounts for."""
-    if floor is None:
-        return False
-    reference = np.sqrt(max(floor.floor_deg**2 - floor.prediction_deg**2, 0.0))
-    return bool(floor.prediction_deg > limits.restless_times * reference)
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """One stretch of a take; errors over the rotations measured in it, degrees."""
-
-    take: str
-    start_s: float
-    end_s: float
-    """Seconds on the take's own clock."""
-    rmse_deg: float
-    rotation: str
-    """The rotation that is worst in it."""
-    rotation_rmse_deg: float
-    pose: str
-    """What the take calls the pose in its middle, "" for nothing."""
-    number: int
-    """Of the take among those given, as two may have one name."""
+def _judged(item: RotationFindings, limits: ComparisonLimits) -> RotationFindings:
+    """With what the limits make of it."""
+    floor, is_near, is_jittery, is_own = (
+        item.floor,
+        is_at_floor(item.rmse_deg, item.floor, limits),
+        False,
+        False,
+    )
+    if floor is not None:
+        reference = np.sqrt(max(floor.floor_deg**2 - floor.prediction_deg**2, 0.0))
+        # The prediction jitters by more than the reference's noise accounts for.
+        is_jittery = bool(floor.prediction_deg > limits.restless_times * reference)
+        most = limits.at_floor_times * float(np.hypot(floor.high_deg, floor.prediction_deg))
+        is_own = is_jittery and item.rmse_deg <= most
+    return replace(
+        item,
+        is_near_floor=is_near,
+        is_at_floor=is_near and not is_jittery,
+        is_own_jitter=is_own,
+        is_mostly_bias=abs(item.bias_deg) >= limits.mostly_bias_share * item.rmse_deg,
+    )
 
 
 def worst_stretches(found: Residuals, most: int = MOST) -> tuple[Stretch, ...]:

@@ -189,11 +189,7 @@ class Sum(Covariance):
 
 def restore_covariance(settings: Any) -> Covariance:
     """The covariance that gave ``settings``; raises DamagedArtifact on an unknown kind."""
-    from glovecal_models.covariance import (  # noqa: F401  what is imported is registered by its kind
-        linear_ard,
-        polynomial,
-        squared_exponential,
-    )
+    from glovecal_models.covariance import functions  # noqa: F401  what is imported is registered by its kind
 
     if not isinstance(settings, Mapping):
         raise DamagedArtifact(f"covariance settings are {settings!r}, expected an object with a kind")

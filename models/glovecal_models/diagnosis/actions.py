@@ -12,13 +12,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from glovecal_models.diagnosis.candidates import is_memory_of_known
-from glovecal_models.diagnosis.formed_error import formed_rmse
+from glovecal_models.diagnosis.candidates import formed_rmse, is_memory_of_known
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.effects.base.assessment import HeldOutRmse
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.catalogue import effect, explaining
+from glovecal_models.effects.base.relations import Whole
+from glovecal_models.effects.catalogue import effect, explaining, relations
 from glovecal_models.layout import Layout
 
 TRAIN_OTHERWISE = "lmc_gpr"
@@ -98,7 +98,7 @@ def actions_for(
     linear: bool,
     seed: int = 0,
     saved_by_known: Mapping[str, float] = NOTHING_SAVED,
-    wholes: Sequence[Effect] = (),
+    wholes: Sequence[Whole] = (),
     own: Sequence[Effect] = (),
 ) -> tuple[Action, ...]:
     """One for each rotation and effect, those that save most first. ``has``: effects that are on a rotation
@@ -131,28 +131,28 @@ def _action(
     sensor = _sensor_of(item.column, layout)
     if linear and sensor is not None and sensor in layout.correspondence(item.rotation).sensors:
         return Action(item, None, method=TRAIN_OTHERWISE)
-    best = Action(item, None)
+    best, of_the_base = Action(item, None), dict(relations().of_the_base)
     for each in explaining(item.column, sensor, own):
         if (each.name, item.rotation) in has:
             continue
         rmse = formed_rmse(design, each, design.rotations.index(item.rotation), seed)
         if rmse is None:
             continue
-        method = each.learned_by if linear else None
-        tried = Action(item, each.name, each.is_physical, method, rmse)
+        method = of_the_base.get(each.name) if linear else None
+        tried = Action(item, each.name, each.about.is_physical, method, rmse)
         # A column that only has a name comes last: it is taken where no physical effect saves anything.
-        if tried.saves and (not best.saves or (each.is_physical and _saved(tried) > _saved(best))):
+        if tried.saves and (not best.saves or (each.about.is_physical and _saved(tried) > _saved(best))):
             best = tried
     return best
 
 
 def _is_of_known(
-    action: Action, design: ForwardDesign, wholes: Sequence[Effect], own: Sequence[Effect]
+    action: Action, design: ForwardDesign, wholes: Sequence[Whole], own: Sequence[Effect]
 ) -> bool:
     if action.effect is None or not action.saves:
         return False
     share = action.saved_share or 0.0
-    if any(action.effect in each.also_explained_by and share < each.also_explained_share for each in wholes):
+    if any(action.effect in each.parts and share < each.share for each in wholes):
         return True
     asked = next((item for item in own if item.name == action.effect), None) or effect(action.effect)
     return is_memory_of_known(design, asked, design.rotations.index(action.rotation))

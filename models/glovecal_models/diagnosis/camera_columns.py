@@ -15,7 +15,7 @@ import numpy as np
 
 from glovecal_models.diagnosis.known_effect import KnownColumns
 from glovecal_models.diagnosis.resampled import ResampledTake
-from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
+from glovecal_models.takes.camera_reference import CAMERA_PATCHES
 
 CameraPart = Literal["varying", "whole", "control", "none"]
 """Of what a camera gets wrong, which belongs to the base: what varies with its stated deviation; all that

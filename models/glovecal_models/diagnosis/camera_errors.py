@@ -23,7 +23,7 @@ from glovecal_models.effects.base.assessment import (
     over_joints,
     squared_in_blocks,
 )
-from glovecal_models.takes.camera_reference.covered_range import CoveredRange, covered_ranges
+from glovecal_models.takes.camera_estimates import CoveredRange, covered_ranges
 from glovecal_models.takes.take import Take
 
 CAMERA = "camera"
@@ -73,7 +73,7 @@ def camera_errors(problem: DiagnosisProblem, takes: Sequence[Take]) -> CameraErr
     return CameraErrors(found, {name: stated[name] for name in names}, covered_ranges(takes, names))
 
 
-def beside_camera(
+def within_camera(
     found: Sequence[Assessment], camera: CameraErrors, problem: DiagnosisProblem, design: ForwardDesign
 ) -> list[Assessment]:
     """The same, held against what the camera may get wrong at any deviation; ``design``: that of ``problem``.

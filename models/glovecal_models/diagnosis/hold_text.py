@@ -2,10 +2,37 @@
 
 from __future__ import annotations
 
+from glovecal_models.diagnosis.hold_answer import DriftInHolds, HeldPose, SensorDrift
 from glovecal_models.diagnosis.hold_drift import HAND, HoldDrift, PoseDrift, drifting
+from glovecal_models.diagnosis.residual_answer import NextTake
 from glovecal_models.effects.catalogue import effect
 
 MOST_SENSORS = 3
+
+
+def drift_in_holds(drift: HoldDrift, next_take: NextTake | None = None) -> DriftInHolds:
+    """As it is answered."""
+    return DriftInHolds(
+        sentence=hold_sentence(drift),
+        verdict=drift.verdict,
+        confidence_set=drift.confidence_set,
+        holds=drift.holds,
+        p_value=drift.p_value,
+        drift_in_other_poses=drift.elsewhere,
+        recovery=drift.recovery,
+        poses=[_held_pose(drift, pose) for pose in drift.poses],
+        next_take=next_take,
+    )
+
+
+def _held_pose(drift: HoldDrift, pose: PoseDrift) -> HeldPose:
+    each = zip(drift.sensors, pose.share.tolist(), pose.same_sign.tolist(), strict=True)
+    sensors = {
+        name: SensorDrift(100.0 * share, drift.change_deg(name, share), int(same))
+        for name, share, same in each
+    }
+    is_long = bool(pose.tau_is_long)
+    return HeldPose(pose.pose, pose.holds, pose.duration_s, pose.tau_s, is_long, pose.is_slowing, sensors)
 
 
 def hold_sentence(drift: HoldDrift) -> str:
@@ -23,12 +50,17 @@ def hold_sentence(drift: HoldDrift) -> str:
 
 
 def _headline(drift: HoldDrift) -> str:
-    causes = ["the hand relaxing" if name == HAND else effect(name).spoken for name in drift.confidence_set]
+    causes = [_cause(name) for name in drift.confidence_set]
     if len(causes) == 1:
         return f"While a pose is held the readings drift: {causes[0]}"
     return (
         f"While a pose is held the readings drift, consistent with {', '.join(causes[:-1])}, or {causes[-1]}"
     )
+
+
+def _cause(name: str) -> str:
+    drift = None if name == HAND else effect(name).about.in_holds
+    return "the hand relaxing" if drift is None else drift.called
 
 
 def _pose(drift: HoldDrift, pose: PoseDrift) -> str:

@@ -10,11 +10,10 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import form_values
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect, HistoryEffect
+from glovecal_models.effects.base.dynamics import ArrayStateEffect
+from glovecal_models.effects.base.effect import CorrectionEffect, Effect
 from glovecal_models.effects.base.learned_form import FormTerm, LearnedForm
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signals import Settings, Signals
 
 
 class KnownColumns(NamedTuple):
@@ -55,17 +54,17 @@ class KnownEffect:
         that has no memory of the joint's own signal alone. All joints are run together: a frame costs mostly
         the call, whatever it holds."""
         names = [name for name in self.joints if name in rotations]
-        if not isinstance(self.effect, ArrayStateEffect) or not names:
+        effect = self.effect
+        if not isinstance(effect, ArrayStateEffect) or not names:
             return {}
         for known, columns in self.kept:
             if known is takes:
                 return columns
         lanes = [rotations.index(name) for name in names]
         some = [replace(take, own=take.own[:, lanes], zero_deg=None) for take in takes]
-        settings = self.effect.fit_repair_constants(some)
-        settings = self.effect.settings_as_stored(some, settings, self.stored)
+        settings = self._settings(effect, some)
         shapes = np.array([self.shapes[self.joints.index(name)] for name in names])
-        found = self.effect.columns_of_takes(some, settings, shapes)
+        found = effect.dynamics.columns_of_takes(some, settings, shapes)
         columns = {name: [part[:, [at]] for part in found] for at, name in enumerate(names)}
         self.kept.append((takes, columns))
         return columns
@@ -73,13 +72,20 @@ class KnownEffect:
     def unsettled(self, takes: Sequence[Signals], lane: int, joint: str) -> list[np.ndarray] | None:
         """For each take (N,): where its unknown start shows in the columns of ``joint``, a lane of ``takes``.
         None where nothing of the joint's motion is remembered."""
-        if joint not in self.joints or not isinstance(self.effect, HistoryEffect):
+        effect = self.effect
+        if joint not in self.joints or not isinstance(effect, CorrectionEffect):
             return None
         single = [one_lane(take, lane) for take in takes]
-        settings = self.effect.fit_repair_constants(single)
-        settings = self.effect.settings_as_stored(single, settings, self.stored)
+        settings = self._settings(effect, single)
         shape = self.shapes[self.joints.index(joint)][None, :]
-        return [self.effect.unsettled(take, settings, shape)[:, 0] for take in single]
+        found = [effect.dynamics.unsettled(take, settings, shape) for take in single]
+        known = [part[:, 0] for part in found if part is not None]
+        return known if len(known) == len(single) else None
+
+    def _settings(self, effect: CorrectionEffect, takes: Sequence[Signals]) -> Settings:
+        """Of lanes of ``takes``, with the columns that the model has."""
+        settings = effect.further.constants(effect, takes)
+        return effect.further.as_stored(takes, settings, self.stored)
 
     def columns(
         self,
@@ -90,20 +96,21 @@ class KnownEffect:
     ) -> KnownColumns | None:
         """Of one joint, a lane of ``takes``; None when it is not concerned. ``together``: as
         ``side_by_side`` has it."""
-        if joint not in self.joints:
+        effect = self.effect
+        if joint not in self.joints or not isinstance(effect, CorrectionEffect):
             return None
         place = self.joints.index(joint)
         single = [one_lane(take, lane) for take in takes]
-        settings = self.effect.fit_repair_constants(single)
-        own_count = len(self.effect.prior_sd(settings))
-        settings = self.effect.settings_as_stored(single, settings, self.stored)
+        settings = effect.further.constants(effect, single)
+        own_count = len(effect.weights(settings).names)
+        settings = effect.further.as_stored(single, settings, self.stored)
         shape = self.shapes[place][None, :]
-        plain = together.get(joint) or self.effect.columns_of_takes(single, settings, shape)
+        plain = together.get(joint) or effect.dynamics.columns_of_takes(single, settings, shape)
         free = np.full(plain[0].shape[2], np.inf)
-        free[own_count:] = self.effect.prior_sd(settings)[own_count:]
+        free[own_count:] = effect.weights(settings).prior_sd[own_count:]
         terms = self.terms[place] if self.terms else ()
         pairs = zip(single, plain, strict=True)
-        values = [form_values(self.effect, take, part, settings) for take, part in pairs] if terms else []
+        values = [form_values(effect, take, part, settings) for take, part in pairs] if terms else []
         terms = tuple(term for term in terms if set(term.inputs) <= set(values[0]))
         if not terms:
             return KnownColumns([part[:, 0, :] for part in plain], free)

@@ -22,6 +22,19 @@ class DiagnosisLimits(SignificanceLimits):
         "A rival that leaves so much more error than the first leaves the confidence set.",
         "Not tuned; chosen with the first version of the diagnosis (2026-11-21).",
     )
+    whole_least_share: float = limit(
+        0.35,
+        "share of the squared error that a ranking saves",
+        "A slip that others seem to explain a part of is named before them only where it is so large.",
+        "Two slow causes at once saved nearly four times as much as the slip that they looked like; of 36"
+        " simulated slips none was as small beside a ranking (2026-11-24).",
+    )
+    outweighed_times: float = limit(
+        3.0,
+        "times the squared error where something was found",
+        "What saves so much more is named before a fault that was found in the recording.",
+        "Not tuned; chosen.",
+    )
 
     confused_correlation: float = limit(
         0.9,
@@ -146,7 +159,7 @@ class DiagnosisLimits(SignificanceLimits):
         "Where nothing else is named, a context effect whose own column the residual goes along with is named"
         " if its learned form saves so much beyond its control.",
         "As least_session_share. On 4 of 4 joints of the simulated glove for which it was made 55 to 78 %"
-        " (2026-11-24).",
+        " (2026-11-24). Of 212 other gloves (2026-11-26) it decided on none: too few to know.",
     )
     association_least_weight: float = limit(
         0.3,
@@ -233,7 +246,10 @@ class DiagnosisLimits(SignificanceLimits):
         _REFERENCE,
     )
     reference_times_apart: float = limit(
-        4.0, "times what either line leaves", "And by more than so many times that.", _REFERENCE
+        4.0,
+        "times what either line leaves",
+        "Minimum ratio of the difference to the fit residual.",
+        _REFERENCE,
     )
     reference_still_deg: float = limit(
         0.5, "degrees", "A reference that stays within this while its sensor moves is frozen.", CHOSEN

@@ -7,8 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import declared_effects, repaired_takes, requested_effects
-from glovecal_models.calibration.training_settings import LINEAR_METHODS
+from glovecal_models.calibration.training_settings import (
+    LINEAR_METHODS,
+    declared_effects,
+    repaired_takes,
+    requested_effects,
+)
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals

@@ -11,19 +11,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.comparison.wearings import partition_of, permuted_sessions
+from glovecal_models.comparison.residuals import partition_of, permuted_sessions
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.effects.base.control import motions_of, with_context
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
+from glovecal_models.effects.base.effect import CorrectionEffect
+from glovecal_models.effects.base.signals import Settings, Signals
 
 PERMUTATIONS = 299
 ROWS_PER_TAKE = 80
 
 
-def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> float:
+def session_p_value(design: ForwardDesign, effect: CorrectionEffect, generator: np.random.Generator) -> float:
     """Share of permutations that explain as much, over all joints together or on one.
 
     The smaller of the two shares is compared with the smaller of each permutation's own, which corrects for
@@ -35,7 +34,7 @@ def session_p_value(design: ForwardDesign, effect: Effect, generator: np.random.
     thin = [take.at(some) for take, some in zip(design.signals, rows, strict=True)]
     settings = design.constants(effect)
     left = [_projected(design, joint, rows) for joint in joints]
-    given = _Given(effect, settings, effect.grid(design.signals, settings), thin, left)
+    given = _Given(effect, settings, effect.shape.grid(design.signals, settings), thin, left)
     own = _own_givers(thin, effect)
     every = np.array([given.explained(order) for order in (own, *permutations)])
     return share_as_large(every)
@@ -68,7 +67,7 @@ class _Given:
 
     def __init__(
         self,
-        effect: Effect,
+        effect: CorrectionEffect,
         settings: Settings,
         grid: np.ndarray,
         takes: Sequence[Signals],
@@ -79,7 +78,7 @@ class _Given:
         self._parts = [_TakePart.of(joints, take) for take in range(len(takes))]
         self._square = np.array([float(joint.target @ joint.target) for joint in joints])
         count = np.array([len(joint.target) for joint in joints])
-        self._held = (self._square / count)[:, None] / effect.prior_sd(settings) ** 2 * 4.0
+        self._held = (self._square / count)[:, None] / effect.weights(settings).prior_sd ** 2 * 4.0
         self._kept: dict[tuple[int, int], _Products] = {}
 
     def explained(self, givers: np.ndarray) -> np.ndarray:
@@ -139,8 +138,10 @@ def wearing_permutations(takes: Sequence[Signals], generator: np.random.Generato
     return permuted_sessions(owners, PERMUTATIONS, generator)
 
 
-def _permutations(design: ForwardDesign, effect: Effect, generator: np.random.Generator) -> list[np.ndarray]:
-    if effect.control == "permuted wearings":
+def _permutations(
+    design: ForwardDesign, effect: CorrectionEffect, generator: np.random.Generator
+) -> list[np.ndarray]:
+    if effect.comparison.control == "permuted wearings":
         return wearing_permutations(design.signals, generator)
     return [generator.permutation(len(design.signals)) for _ in range(PERMUTATIONS)]
 
@@ -168,17 +169,17 @@ def _within_motions(
     return list(found.values())[:PERMUTATIONS]
 
 
-def _own_givers(takes: Sequence[Signals], effect: Effect) -> np.ndarray:
+def _own_givers(takes: Sequence[Signals], effect: CorrectionEffect) -> np.ndarray:
     """Every take as it was recorded."""
-    if effect.control != "permuted wearings":
+    if effect.comparison.control != "permuted wearings":
         return np.arange(len(takes))
     names = list(dict.fromkeys(take.wearing for take in takes))
     return np.array([names.index(take.wearing) for take in takes])
 
 
-def _given(takes: Sequence[Signals], take: int, giver: int, effect: Effect) -> Signals:
+def _given(takes: Sequence[Signals], take: int, giver: int, effect: CorrectionEffect) -> Signals:
     """A take with the wearing of that number, or the context of the take of that number."""
-    if effect.control == "permuted wearings":
+    if effect.comparison.control == "permuted wearings":
         names = list(dict.fromkeys(each.wearing for each in takes))
         return replace(takes[take], wearing=names[giver])
     return takes[take] if take == giver else with_context(takes[take], takes[giver])

@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.signatures import own_sensors
+from glovecal_models.diagnosis.signatures import LABELS, are_pose_labels, own_sensors
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-LABELS = (0.0, 1.0)
-"""Of a reference that names poses and measures no angle: 1 for a fist, 0 for a flat hand."""
 OUTERMOST_PCT = (2, 98)
 BIN_S = 0.25
 LONGEST_GAP_S = 1.0
+"""Between frames of one hold; a longer gap ends it."""
 
 
 @dataclass(frozen=True)
@@ -147,17 +146,6 @@ def _named(found: Sequence[PosedHold], same_pose: float) -> list[PosedHold]:
             hold = replace(hold, pose=f"pose {near[0] + 1 if near else len(levels)}")
         result.append(hold)
     return result
-
-
-def are_pose_labels(takes: Sequence[Take]) -> bool:
-    """Whether all reference values of all takes are 0 or 1, both occur, and each lasts."""
-    found: set[float] = set()
-    for take in takes:
-        values = take.reference[np.isfinite(take.reference)]
-        if not np.isin(values, LABELS).all():
-            return False
-        found.update(label for label in LABELS if (values == label).any())
-    return found == set(LABELS)
 
 
 def labels_at_frames(take: Take) -> tuple[str, ...] | None:

@@ -8,12 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glovecal_models.diagnosis.camera_columns import CameraPart
-from glovecal_models.diagnosis.formed_error import FormInputs
-from glovecal_models.diagnosis.forward_basis import EVERY, ForwardBasis
-from glovecal_models.diagnosis.forward_design import ForwardDesign, forward
+from glovecal_models.diagnosis.candidates import FormInputs
+from glovecal_models.diagnosis.forward_design import EVERY, ForwardBasis, ForwardDesign, forward
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.naming import Naming
 from glovecal_models.diagnosis.resampled import (
     RATE_HZ,
     SMOOTHING,
@@ -23,7 +21,8 @@ from glovecal_models.diagnosis.resampled import (
     shifted,
     smoothed,
 )
-from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.assessment import Assessment
+from glovecal_models.effects.base.effect import CorrectionEffect, Effect
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
@@ -107,16 +106,16 @@ class DiagnosisProblem:
         return replace(self, known=(*self.known, *effects))
 
     def with_first(
-        self, naming: Naming, effects: Mapping[str, Effect], design: ForwardDesign
+        self, first: Assessment | None, effects: Mapping[str, Effect], design: ForwardDesign
     ) -> DiagnosisProblem:
-        """The same with the first of the ranking in the base, or repaired: what is left after it.
+        """The same with the first of a ranking in the base, or repaired: what is left after it.
 
-        ``design`` is the one without it.
+        ``first``: None when nothing is ranked; ``design`` is the one without it.
         """
-        if not naming.ranked:
+        if first is None:
             return self
-        first = naming.ranked[0]
-        delay = effects[first.effect].reference_delay_s(first)
+        comparison = effects[first.effect].comparison
+        delay = None if comparison is None else comparison.reference_delay_s(first)
         if delay is not None:
             delay = np.broadcast_to(delay, (len(self.even),))
             moved = [shifted(take, float(by)) for take, by in zip(self.even, delay, strict=True)]
@@ -135,13 +134,14 @@ def _with_joints(take: ResampledTake, kept: np.ndarray) -> ResampledTake:
 
 def _with_learned_terms(known: KnownEffect, design: ForwardDesign) -> KnownEffect:
     """The same in the form that the takes of ``design``, whose base does not have it, ask for."""
-    terms, together = [], known.side_by_side(design.signals, design.rotations)
+    terms, together, effect = [], known.side_by_side(design.signals, design.rotations), known.effect
+    assert isinstance(effect, CorrectionEffect), "only corrections are known with shapes"
     for joint, shape in zip(known.joints, known.shapes, strict=True):
         lane = design.rotations.index(joint)
         takes = design.of_joint(lane)
-        settings = known.effect.fit_repair_constants(takes)
+        settings = effect.further.constants(effect, takes)
         plain = together.get(joint)
-        inputs = FormInputs.of(design, lane, known.effect, takes, settings, shape[None, :], plain=plain)
+        inputs = FormInputs.of(design, lane, effect, takes, settings, shape[None, :], plain=plain)
         terms.append(inputs.terms(design, lane, range(len(inputs.plain))))
     return replace(known, terms=tuple(terms))
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
-from glovecal_models.diagnosis.posed_holds import are_pose_labels
+from glovecal_models.diagnosis.signatures import are_pose_labels
 from glovecal_models.layout import Layout
-from glovecal_models.takes.reference_check import radians_problem
+from glovecal_models.takes.reference_jumps import radians_problem
 from glovecal_models.takes.take import Take
 
 RADIAN_DEG = 180.0 / np.pi

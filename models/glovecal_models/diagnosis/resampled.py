@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.takes.known_latency import KnownLatency
-from glovecal_models.takes.take import Take
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
+from glovecal_models.takes.take import KnownLatency, Take
 
 RATE_HZ = 50.0
 WINDOW_S = 0.05

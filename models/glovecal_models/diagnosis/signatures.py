@@ -11,25 +11,33 @@ from glovecal_models.calibration.effect_correction import SignalScale
 from glovecal_models.calibration.folds import held_levels
 from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
+from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming, saved_share_of
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Stage
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import (
-    Finding,
-    FoundBefore,
+from glovecal_models.effects.base.effect import (
+    Effect,
+    IntervalEffect,
+    RepairEffect,
     SignatureEffect,
-    frames_inside,
+    is_asked_last,
 )
+from glovecal_models.effects.base.findings import Finding, FoundBefore, frames_inside
+from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.catalogue import relations
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
+LABELS = (0.0, 1.0)
+"""Of a reference that names poses and measures no angle: 1 for a fist, 0 for a flat hand."""
 FEWEST_MEASURED = 50
 """Measured frames of a joint; fewer tell no curve."""
 
 
 def may_explain(
-    effect: Effect, naming: Naming, found: Sequence[Finding], effects: Mapping[str, Effect]
+    effect: Effect,
+    naming: Naming,
+    found: Sequence[Finding],
+    effects: Mapping[str, Effect],
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> bool:
     """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
     effects that seem to explain a part of it, and not in equal steps of a column. These explain no more than
@@ -40,8 +48,8 @@ def may_explain(
     if not naming.ranked:
         return True
     first = naming.ranked[0]
-    if first.steps is None and saved_share_of(first) < effect.also_explained_share:
-        return _size_square(found) >= LEAST_SIZE * first.saved_square
+    if first.steps is None and saved_share_of(first) < relations().whole(effect.name).share:
+        return _size_square(found) >= limits.whole_least_share * first.saved_square
     needless = [set(item.accounts_for) for item in found]
     if all(item.effect in set.intersection(*needless) for item in naming.ranked):
         return True
@@ -61,33 +69,33 @@ def _size_square(found: Sequence[Finding]) -> float:
 def is_asked_beside(effect: Effect, naming: Naming, effects: Mapping[str, Effect]) -> bool:
     """Whether an effect that is asked for last may be behind a ranking: all of it seems to explain a part of
     the effect. A column that goes along is no cause by itself, whatever its name."""
-    return all(
-        item.effect in effect.also_explained_by or not effects[item.effect].is_physical
-        for item in naming.ranked
-    )
+    parts = relations().whole(effect.name).parts
+    return all(item.effect in parts or not effects[item.effect].about.is_physical for item in naming.ranked)
 
 
-LEAST_SIZE = 0.35
-"""Of the square that a ranking saves: a slip that is smaller cannot be what it seems to explain. Two slow
-causes at once saved nearly four times as much as the slip that they looked like; of 36 simulated slips none
-was as small beside a ranking."""
-OUTWEIGHED = 3.0
-"""Times the squared error where findings are: what saves so much more is named before them."""
-
-
-def is_outweighed(found: Sequence[Finding], naming: Naming) -> bool:
+def is_outweighed(
+    found: Sequence[Finding], naming: Naming, limits: DiagnosisLimits = DIAGNOSIS_LIMITS
+) -> bool:
     """Whether the first of a ranking explains far more error than there is where something was found."""
     squares = [item.error_square for item in found]
     if not naming.ranked or any(square is None for square in squares):
         return False
     there = sum(square for square in squares if square is not None)
-    return naming.ranked[0].saved_square > OUTWEIGHED * there
+    return naming.ranked[0].saved_square > limits.outweighed_times * there
 
 
-def by_signature(effects: Sequence[Effect], stage: Stage) -> list[SignatureEffect]:
-    """Effects asked for by their signature at a stage: repairs first, each kind by name."""
-    found = [item for item in effects if isinstance(item, SignatureEffect) and item.stage == stage]
-    return sorted(found, key=lambda item: (item.kind != "repair", item.name))
+def asked_first(effects: Sequence[Effect]) -> list[SignatureEffect]:
+    """Effects asked for by their signature before anything else is judged, because they would mislead the
+    others: repairs first, each kind by name."""
+    every = [item for item in effects if isinstance(item, SignatureEffect) and item.comparison is None]
+    found = [item for item in every if not is_asked_last(item)]
+    return sorted(found, key=lambda item: (not isinstance(item, RepairEffect), item.name))
+
+
+def asked_last(effects: Sequence[Effect]) -> list[IntervalEffect]:
+    """Effects asked for by their signature once nothing that was compared explains the error, by name."""
+    found = [item for item in effects if isinstance(item, IntervalEffect) and is_asked_last(item)]
+    return sorted(found, key=lambda item: item.name)
 
 
 def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
@@ -105,6 +113,7 @@ def signature_findings(
     by_name: Mapping[str, Effect],
     known: Sequence[KnownEffect] = (),
     found_before: FoundBefore | None = None,
+    limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
 ) -> Iterator[Finding]:
     """Largest first within each effect of ``effects``, those that the model does not have; ``known`` are
     those that it has, ``by_name`` all that were ranked."""
@@ -112,21 +121,33 @@ def signature_findings(
     sensor_of = own_sensors(layout, joints)
     if not sensor_of:
         return
-    first = by_signature(effects, "first")
+    first = asked_first(effects)
     if are_held_levels(takes):
         for item in first:
-            yield from item.find_between_levels(takes, sensor_of)
+            if isinstance(item, RepairEffect):
+                yield from item.between_levels(takes, sensor_of)
         return
     for item in first:
         found = found_before.find(item, takes, sensor_of)
         if naming.ranked and any(each.stretches for each in found):
             found = _with_error_squares(found, takes, sensor_of, static_errors(takes, sensor_of, known))
         yield from found
-    for item in by_signature(effects, "last"):
+    for item in asked_last(effects):
         if is_asked_beside(item, naming, by_name):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
-            if found and may_explain(item, naming, found, by_name):
+            if found and may_explain(item, naming, found, by_name, limits):
                 yield from found
+
+
+def are_pose_labels(takes: Sequence[Take]) -> bool:
+    """Whether all reference values of all takes are 0 or 1, both occur, and each lasts."""
+    found: set[float] = set()
+    for take in takes:
+        values = take.reference[np.isfinite(take.reference)]
+        if not np.isin(values, LABELS).all():
+            return False
+        found.update(label for label in LABELS if (values == label).any())
+    return found == set(LABELS)
 
 
 def are_held_levels(takes: Sequence[Take]) -> bool:

@@ -1,18 +1,43 @@
-"""What a diagnosis found in sentences for people, from its results alone."""
+"""What a diagnosis found, as it is answered: in sentences for people, from its results alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.text import model_effect
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.odd_takes import OddTake
 from glovecal_models.diagnosis.actions import Action, together
+from glovecal_models.diagnosis.answer import (
+    NOTHING_NAMED,
+    FoundInRecording,
+    MissingEffects,
+    NotShown,
+    RotationError,
+    TakeSetAside,
+)
+from glovecal_models.diagnosis.camera_errors import CAMERA
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.floor_ratio import FloorRatio
-from glovecal_models.diagnosis.hold_text import hold_sentence
-from glovecal_models.diagnosis.next_take import NextTake
-from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, NotIdentifiable
+from glovecal_models.diagnosis.hold_text import drift_in_holds, hold_sentence
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, NotIdentifiable
+from glovecal_models.diagnosis.residual_answer import (
+    AssociatedColumn,
+    FloorTimes,
+    Remedy,
+    Unexplained,
+    explained,
+)
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
+from glovecal_models.diagnosis.slow_error import FloorRatio
+from glovecal_models.diagnosis.trial.answer import Candidate
 from glovecal_models.diagnosis.unexplained_residual import SlowExcess, UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment, HeldOutRmse
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.catalogue import DeclaredEffect, relations
+from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import excluded_sentences
 
 MOST_ASSOCIATIONS = 3
 UNITS = "The reference only names poses: errors are shares of the step from 0 to 1, not degrees."
@@ -34,7 +59,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences += [part_sentence(item) for item in diagnosis.assessments if item.part_of]
     sentences += [within_slip_sentence(item) for item in diagnosis.assessments if _is_within_slip(item)]
     if diagnosis.next_take is not None:
-        sentences.append(next_take_sentence(diagnosis.next_take))
+        sentences.append(diagnosis.next_take.sentence)
     sentences.append(residual_sentence(diagnosis.residual, by_column=diagnosis.by_column))
     return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
 
@@ -52,7 +77,7 @@ def camera_sentences(diagnosis: Diagnosis) -> list[str]:
         " own errors may explain as much."
         for item in within
     ]
-    return [*sentences, *(item.sentence() for item in camera.ranges)]
+    return [*sentences, *(item.sentence for item in camera.ranges)]
 
 
 def named_sentence(diagnosis: Diagnosis) -> str | None:
@@ -74,35 +99,28 @@ def ranked_sentence(diagnosis: Diagnosis) -> str:
     """The first of the ranking, with its evidence and its confidence set."""
     item = diagnosis.naming.ranked[0]
     where = ", ".join(item.joints[i] for i in item.significant_joints)
-    p_value = "" if item.p_value is None else f", p = {item.p_value:.2g}"
-    start = f"{item.effect} on {where} explains {explained(item.rmse_deg, p_value)}"
-    named, rivals = diagnosis.effects[item.effect], diagnosis.naming.confidence_set[1:]
-    more = named.consequence(item, diagnosis.naming.confidence_set)
-    if diagnosis.linear and named.learned_by is not None:
-        better = f"The base is a straight line; one of --method {named.learned_by} learns this by itself."
+    start = f"{item.effect} on {where} explains {_explained(item.rmse_deg, item.p_value)}"
+    rivals, comparison = diagnosis.naming.confidence_set[1:], diagnosis.effects[item.effect].comparison
+    more = "" if comparison is None else comparison.consequence(item, diagnosis.naming.confidence_set)
+    table = relations()
+    method, unrecorded = (dict(rows).get(item.effect) for rows in (table.of_the_base, table.unrecorded))
+    if diagnosis.linear and method is not None:
+        better = f"The base is a straight line; one of --method {method} learns this by itself."
         more = f"{more} {better}".lstrip()
     if rivals:
         return f"{start}; ambiguous with {', '.join(rivals)}. {more}".rstrip()
-    return f"{start}; {named.caveat}. {more}".rstrip() if named.caveat else f"{start}. {more}".rstrip()
+    return f"{start}; {unrecorded}. {more}".rstrip() if unrecorded else f"{start}. {more}".rstrip()
 
 
-def explained(rmse: HeldOutRmse, p_value: str = "") -> str:
-    """What an effect and its control explain, as shares of the squared error of the sensors that read the
-    rotations. Degrees are those of a model: only training, adding an effect and comparing tell them."""
-    of_effect, of_control = (
-        max(1.0 - (left / max(rmse.before, 1e-9)) ** 2, 0.0) for left in (rmse.after, rmse.control)
-    )
-    return (
-        f"{100 * of_effect:.0f} % of the squared error of these sensors on held-out takes (control:"
-        f" {100 * of_control:.0f} %{p_value})"
-    )
+def _explained(rmse: HeldOutRmse, p_value: float | None = None) -> str:
+    return explained(rmse.before, rmse.after, rmse.control, p_value)
 
 
 def by_column_sentence(actions: Sequence[Action]) -> str:
     """Of an effect that is named because the residual goes along with the column that measures its cause."""
     where = ", ".join(item.rotation for item in actions)
     return (
-        f"{actions[0].effect} on {where} explains {explained(together(actions))} in a form that these takes"
+        f"{actions[0].effect} on {where} explains {_explained(together(actions))} in a form that these takes"
         " tell; no usual form of it does. The error goes along with"
         f" {actions[0].association.phrase}, which measures it."
     )
@@ -114,7 +132,7 @@ def nothing_named_sentence(diagnosis: Diagnosis) -> str:
     fewest = diagnosis.limits.fewest_blocks
     if blocks < fewest:
         return f"Too few data to judge any effect: {blocks} blocks of 5 s, {fewest} are needed."
-    return "No known effect beats its control significantly."
+    return NOTHING_NAMED
 
 
 def within_known_sentence(item: Assessment) -> str:
@@ -156,18 +174,13 @@ def _is_within_slip(item: Assessment) -> bool:
 def candidate_sentence(item: Assessment) -> str:
     """What an effect and its control explain."""
     return (
-        f"{item.effect} explains {explained(item.rmse_deg)}; most on"
+        f"{item.effect} explains {_explained(item.rmse_deg)}; most on"
         f" {item.largest_contrast_joint}.{_in_steps(item)}"
     )
 
 
 def _in_steps(item: Assessment) -> str:
     return "" if item.steps is None else f" It acts in equal steps of {item.steps.width:.3g} of its column."
-
-
-def next_take_sentence(take: NextTake) -> str:
-    """What to record, and why."""
-    return f"To separate {' and '.join(take.separates)}, record {take.seconds} s: {take.what}"
 
 
 def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
@@ -251,24 +264,22 @@ def _above_floor(name: str, item: FloorRatio) -> str:
     )
 
 
-def action_sentence(action: Action) -> str:
-    """What to do about one association, and what it would save."""
-    item = action.association
-    if action.method is not None:
-        return (
-            f"{item.rotation}: the residual is associated with {item.phrase}, which the layout gives it and a"
-            f" straight line cannot use: nonlinearity of the base; train with --method {action.method}."
-        )
-    if action.effect is None or action.rmse_deg is None or not action.saves:
-        return (
-            f"{item.rotation}: the residual is associated with {item.phrase}; no effect of it reduces the"
-            " smoothed error more than its control."
-        )
-    unnamed = "" if action.is_physical else " (no cause is claimed)"
-    within = " That is no more than the model's own effects may have left there." * action.is_within_known
-    return (
-        f"{item.rotation}: the residual is associated with {item.phrase}; {action.effect}{unnamed} explains"
-        f" {explained(action.rmse_deg)}.{within}"
+def unexplained(
+    found: UnexplainedResidual, is_noise: bool | None = None, by_column: Sequence[Action] = ()
+) -> Unexplained:
+    """As answers tell it. ``is_noise``: of the errors shown beside it; None: the residual's own."""
+    return Unexplained(
+        found.is_significant,
+        residual_sentence(found, is_noise, by_column),
+        residual_obstacle(found),
+        [
+            AssociatedColumn(item.rotation, item.column, item.phrase, item.size_deg, item.p_value)
+            for item in found.associations
+        ],
+        {
+            name: FloorTimes(item.rmse_deg, item.times, item.lower_times, item.is_judgeable)
+            for name, item in found.floor_ratios.items()
+        },
     )
 
 
@@ -311,3 +322,94 @@ def _associated(columns: Sequence[ResidualAssociation]) -> str:
         for item in columns[:MOST_ASSOCIATIONS]
     ]
     return f"it is associated with {', '.join(each)}"
+
+
+# Answers, from results.
+
+
+def missing_effects(diagnosis: Diagnosis) -> MissingEffects:
+    """Of the takes that were diagnosed."""
+    held, camera, named = diagnosis.hold_drift, diagnosis.camera, diagnosis.named
+    of_camera = (
+        []
+        if camera is None or not camera.joints
+        else [FoundInRecording(CAMERA, "deviation", camera.joints, camera.sentence)]
+    )
+    return MissingEffects(
+        rotations={
+            name: _rotation(error, diagnosis.noise_floors.get(name))
+            for name, error in diagnosis.rmse_deg.items()
+        },
+        named=None if named is None else replace(named, sentence=named_sentence(diagnosis) or ""),
+        candidates=[candidate(item) for item in diagnosis.ranked_assessments],
+        not_identifiable=[NotShown(item.effect, item.why) for item in diagnosis.not_identifiable],
+        unexplained_residual=unexplained(diagnosis.residual, by_column=diagnosis.by_column),
+        next_take=diagnosis.next_take,
+        sentences=diagnosis_sentences(diagnosis),
+        findings=[
+            *of_camera,
+            *(
+                FoundInRecording(item.effect, item.kind, item.where, item.sentence, item.stretches)
+                for item in diagnosis.findings
+            ),
+        ],
+        camera_ranges=() if camera is None else camera.ranges,
+        reference_problems=diagnosis.reference_problems,
+        hold_drift=None if held is None else drift_in_holds(held),
+        actions=[remedy(item) for item in diagnosis.actions],
+        decided=diagnosis.decided,
+    )
+
+
+def missing_in_model(
+    diagnosis: Diagnosis,
+    odd: Sequence[OddTake],
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    own: Sequence[Effect] = (),
+) -> MissingEffects:
+    """With the takes that were set aside of all ``takes``, what the model has, and the user's ``own``
+    effects that were tried too."""
+    return replace(
+        missing_effects(diagnosis),
+        odd_takes=[
+            TakeSetAside(
+                item.take, item.sentence, item.how, item.error_deg, item.usual_deg, item.fitted_deg,
+                place=item.place,
+            )
+            for item in odd
+            if item.is_set_aside
+        ],
+        excluded=excluded_sentences(takes),
+        model_effects=[model_effect(item) for item in model.effects],
+        declarations=[item.declaration.to_document() for item in own if isinstance(item, DeclaredEffect)],
+    )  # fmt: skip
+
+
+def _rotation(rmse_deg: float, floor: NoiseFloor | None) -> RotationError:
+    return RotationError(rmse_deg, None if floor is None else floor.floor_deg, floor)
+
+
+def candidate(item: Assessment) -> Candidate:
+    rmse, errors = item.rmse_deg, list(zip(item.joints, item.errors, strict=True))
+    return Candidate(
+        effect=item.effect,
+        where=[item.joints[i] for i in item.significant_joints],
+        rmse_before_deg=rmse.before,
+        rmse_after_deg=rmse.after,
+        rmse_control_deg=rmse.control,
+        saved_share={name: error.saved for name, error in errors},
+        control_saved_share={name: error.control_saved for name, error in errors},
+        p_value=item.p_value,
+        passes=bool(item.significant_joints),
+        sentence=candidate_sentence(item),
+    )
+
+
+def remedy(action: Action) -> Remedy:
+    item, rmse = action.association, action.rmse_deg
+    errors = (None, None, None) if rmse is None else (rmse.before, rmse.after, rmse.control)
+    return Remedy(
+        item.rotation, item.column, item.phrase, action.effect, action.is_physical, action.method, *errors,
+        action.saves, action.is_within_known,
+    )  # fmt: skip

@@ -25,7 +25,6 @@ import numpy as np
 
 from glovecal_models.calibration.held_out import BaseProducts
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.diagnosis.floor_ratio import FloorRatio, floor_ratios
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
@@ -33,15 +32,17 @@ from glovecal_models.diagnosis.resampled import ResampledTake
 from glovecal_models.diagnosis.residual_association import ResidualAssociation, residual_associations
 from glovecal_models.diagnosis.slow_error import (
     NOTHING_SHARED,
+    FloorRatio,
     SecondMeans,
     SharedError,
     SlowError,
+    floor_ratios,
     second_means,
     shared_error,
     slow_error,
     without_drift,
 )
-from glovecal_models.effects.base.history_effect import unbroken
+from glovecal_models.effects.base.dynamics import unbroken
 from glovecal_models.layout import Layout
 
 SHORTEST_LINE_S = 4.0
@@ -115,20 +116,19 @@ def unexplained_residual(
     layout: Layout,
     seed: int = 0,
     *,
-    known: Sequence[KnownEffect] = (),
-    floors: Mapping[str, NoiseFloor] | None = None,
-    undecided: Sequence[str] = (),
+    floors: Mapping[str, NoiseFloor],
+    healthy: Set[str] = frozenset(),
     stated_deg: Mapping[str, float] = NOTHING_STATED,
 ) -> UnexplainedResidual:
-    """Judge the held-out residuals of ``design``, whose base includes the ``known`` effects.
+    """Judge the held-out residuals of ``design``.
+
+    ``healthy``: joints whose error is known to be a healthy glove's (``healthy_beside``).
 
     ``stated_deg``: of each joint whose reference states deviations, degrees. What a camera gets wrong lasts:
     a slow error no larger than them is the camera's, and what joints share too, as it sees one hand.
 
-    ``even``: its takes, for their readings; ``floors``: of each joint where it is known. ``undecided``:
-    effects that save much and that these takes cannot decide; they are not in the base.
+    ``even``: its takes, for their readings; ``floors``: of each joint where it is known.
     """
-    design = _without_unsettled(design, known)
     generator, limits = np.random.default_rng(seed), design.limits
     means = [second_means(design, joint) for joint in range(len(design.rotations))]
     slow = _slow(design, means)
@@ -136,9 +136,7 @@ def unexplained_residual(
     found = UnexplainedResidual(
         slow=dict(zip(design.rotations, slow, strict=True)),
         within_takes=dict(zip(design.rotations, within, strict=True)),
-        floor_ratios=floor_ratios(design, floors or {}),
-        undecided=tuple(undecided),
-        unsettled=_unsettled_effects(design, known),
+        floor_ratios=floor_ratios(design, floors),
         limits=limits,
     )
     above = [name for name, item in found.floor_ratios.items() if item.exceeds > 1]
@@ -147,7 +145,6 @@ def unexplained_residual(
     if not found.judged:
         return replace(found, obstacle="few stretches")
     found = replace(found, shared=shared_error(means, generator, limits))
-    healthy = _healthy_beside(found, known)
     ratios = [
         0.0 if name in healthy else _ratio(over_all, inside, limits)
         for name, over_all, inside in zip(design.rotations, slow, within, strict=True)
@@ -228,10 +225,13 @@ def _possible_excess(found: UnexplainedResidual, healthy: Set[str]) -> SlowExces
     return SlowExcess(joint, worst, most)
 
 
-def _healthy_beside(found: UnexplainedResidual, known: Sequence[KnownEffect]) -> frozenset[str]:
+def healthy_beside(
+    design: ForwardDesign, known: Sequence[KnownEffect], floors: Mapping[str, NoiseFloor]
+) -> frozenset[str]:
     """Joints that an effect acts on and whose error is so few floors as a healthy glove's."""
     there = {name for item in known for name in item.joints}
-    return frozenset(name for name, item in found.floor_ratios.items() if name in there and item.is_healthy)
+    ratios = floor_ratios(design, floors)
+    return frozenset(name for name, item in ratios.items() if name in there and item.is_healthy)
 
 
 def _healthy(item: SlowError, limits: DiagnosisLimits) -> float:
@@ -242,7 +242,7 @@ def _healthy_within(item: SlowError, limits: DiagnosisLimits) -> float:
     return max(limits.healthy_within_deg, limits.healthy_within_noises * item.noise_deg)
 
 
-def _without_unsettled(design: ForwardDesign, known: Sequence[KnownEffect]) -> ForwardDesign:
+def without_unsettled(design: ForwardDesign, known: Sequence[KnownEffect]) -> ForwardDesign:
     """The design with those rows and residuals that can be judged; the same where nothing remembers."""
     masks = [_unsettled(design, known, joint) for joint in range(len(design.rotations))]
     if not any(masks):
@@ -252,7 +252,7 @@ def _without_unsettled(design: ForwardDesign, known: Sequence[KnownEffect]) -> F
     return replace(design, used=used, products=products, kept={})
 
 
-def _unsettled_effects(design: ForwardDesign, known: Sequence[KnownEffect]) -> tuple[str, ...]:
+def unsettled_effects(design: ForwardDesign, known: Sequence[KnownEffect]) -> tuple[str, ...]:
     """Names of those that settle in none of the takes: nothing is known of offsets of whole takes."""
     found = [
         item.effect.name

@@ -13,12 +13,11 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.sensor_sensitivity import trained_ranges
-from glovecal_models.calibration.wearer_fit import Misfit, WearerFit
-from glovecal_models.takes.dead_sensor import dead_sensors
+from glovecal_models.calibration.samples import trained_ranges
+from glovecal_models.calibration.servable import Misfit, WearerFit
 from glovecal_models.takes.reading_faults import dropouts, spikes
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_check import check_take
+from glovecal_models.takes.take_check import check_take, dead_sensors
 
 Part = Literal["capture", "cable", "sensor", "supply", "motion", "wearing", "wearer", "model"]
 
@@ -27,17 +26,21 @@ SLOW_SHARE = 0.8
 FEW_GAPS = 2
 """In some seconds: a busy computer has as many."""
 MOVED_COUNTS = 6.0
+"""A sensor that went through fewer counts did not move."""
 MOVED_SHARE = 0.08
 """Of the range learned: a sensor that went through less did not move."""
 FEW_MOVED = 0.5
 """Share of sensors: with fewer in motion nothing is said of those that stand still."""
 FEW_JUMPS = 3
+"""In some seconds: from so many on a sensor jumps."""
 OUTSIDE_SHARE = 0.1
 """Of the range learned, beyond its ends."""
 OUTSIDE_FRAMES = 0.25
+"""Share of the frames that must lie there."""
 ALL_AT_ONCE = 0.6
 """Share of sensors beyond the same end: what they have in common is the supply."""
 FEWEST_TOGETHER = 3
+"""Sensors; fewer have nothing in common."""
 MOSTLY = 0.8
 """Share of the frames at one value, from which on a sensor is looked at more closely."""
 MOST_NAMED = 4

@@ -10,14 +10,18 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.effect import CorrectionEffect, Effect
+from glovecal_models.effects.base.relations import Relations
+from glovecal_models.effects.base.signals import Settings, Signals
 from glovecal_models.effects.base.wearing_effect import WearingEffect
-from glovecal_models.effects.column_dependence import PREFIX as COLUMN
-from glovecal_models.effects.column_dependence import ColumnDependence
-from glovecal_models.effects.context_dependence import PREFIX as CONTEXT
-from glovecal_models.effects.context_dependence import ContextDependence, unfamiliar_columns
+from glovecal_models.effects.between import TABLE
+from glovecal_models.effects.column_dependence import (
+    COLUMN,
+    CONTEXT,
+    ColumnDependence,
+    ContextDependence,
+    unfamiliar_columns,
+)
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
@@ -45,7 +49,23 @@ def registered_effects() -> dict[str, Effect]:
         if point.name in found:
             raise BadInput(f"two packages bring an effect of the name {point.name!r}")
         found[point.name] = effect
+    check_relations(found)
     return found
+
+
+def relations() -> Relations:
+    """What stands between effects, with the rows that packages bring."""
+    return _relations(registered_effects())
+
+
+def check_relations(known: Mapping[str, Effect]) -> None:
+    """Raise BadInput for a row between effects that names none of ``known``, and for one that is there
+    twice."""
+    _relations(known).check(known)
+
+
+def _relations(known: Mapping[str, Effect]) -> Relations:
+    return TABLE.joined(item.about.relations for item in known.values())
 
 
 def effect(name: str) -> Effect:
@@ -68,11 +88,15 @@ def candidates(takes: Sequence[Signals], own: Sequence[Effect] = ()) -> list[Eff
     return [*known, *(ContextDependence.of(name, takes) for name in unfamiliar)]
 
 
-def explaining(column: str, sensor: str | None, own: Sequence[Effect] = ()) -> list[Effect]:
+def explaining(column: str, sensor: str | None, own: Sequence[Effect] = ()) -> list[CorrectionEffect]:
     """Effects that may be behind an error that goes along with ``column``, as ``glovecal where`` calls it:
     those of the catalogue, a user's ``own``, and last what only names the column. ``sensor`` reads it, where
     one does."""
-    found = [item for item in (*catalogue().values(), *own) if item.has_columns and item.may_show_in(column)]
+    found = [
+        item
+        for item in (*catalogue().values(), *own)
+        if isinstance(item, CorrectionEffect) and item.about.may_show_in(column, item.context)
+    ]
     kind, _, name = column.partition(" ")
     if kind == "context":
         return found or [ContextDependence(name)]
@@ -109,3 +133,11 @@ def stored_effect(name: str, settings: Settings) -> Effect:
     if "declaration" in settings:
         return ExpressionEffect.from_document(settings["declaration"])
     return effect(name)
+
+
+def stored_correction(name: str, settings: Settings) -> CorrectionEffect:
+    """The same, of an effect that a stored model has with weights. Raises BadInput."""
+    found = stored_effect(name, settings)
+    if not isinstance(found, CorrectionEffect):
+        raise BadInput(f"effect {name!r} has no columns here; install the version it was learned with")
+    return found

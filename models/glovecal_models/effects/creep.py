@@ -8,17 +8,16 @@ has to go (learned; the best guess without a recording of the time before).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Parameter, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect
-from glovecal_models.effects.base.joint_units import fit_joint_units, on_lanes
-from glovecal_models.effects.base.motions import RAMPS
+from glovecal_models.effects.base.dynamics import ArrayStateEffect
+from glovecal_models.effects.base.effect import CorrectionEffect, FormSignals, FurtherColumns
+from glovecal_models.effects.base.facts import About, DriftInHolds, Parameter, Shape, Weights
+from glovecal_models.effects.base.relations import RAMPS
 from glovecal_models.effects.base.relaxation import relax, relax_once
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, on_lanes
 
 RATIO = 4.0
 """Between neighbouring time constants: close enough for a logarithmic or power law between them."""
@@ -32,27 +31,44 @@ each take, of which there are few. Eight simulated gloves with a pre-roll were r
 a clean glove's error with 1 (median 1.5), to 1.2 to 1.9 with 0.2 (1.35; 2026-11-24)."""
 FASTEST_S = 0.4
 """Of a relaxation: what is faster is a lag, which creep must not take for itself."""
+PARTS = ("fast", "middle", "slow")
 LONGEST_SHARE = 0.7
 """Of a take's length: a slower relaxation cannot be told from a constant."""
 
 
+class Series(Shape):
+    """Three time constants in a fixed ratio."""
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        longest = max(float(take.time_s[-1] - take.time_s[0]) for take in takes)
+        slow = np.array([tau for tau in SLOW_S if tau <= LONGEST_SHARE * longest] or SLOW_S[:1])
+        series = slow[:, None] / RATIO ** np.arange(2, -1, -1)
+        return np.repeat(series[:, None, :], takes[0].own.shape[1], axis=1)
+
+
+class FurtherRelaxations(FurtherColumns):
+    def constants(self, effect: CorrectionEffect, takes: Sequence[Signals]) -> Settings:
+        return effect.fit_constants(takes) | {"beside": list(BESIDE), "fastest_s": FASTEST_S}
+
+
 class Creep(ArrayStateEffect):
     name = "creep"
-    explanation = "After a movement the reading goes on drifting for seconds although the joint is held."
-    source = "standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34"
-    form_unit: ClassVar[str] = "deg"
-    shown_by: ClassVar = RAMPS
-    shows_in: ClassVar = ("direction", "time in take")
-    shown_over: ClassVar = "hold"
-    drift_in_holds: ClassVar = "begins anew with each hold"
-    rest_like: ClassVar = ("hysteresis",)
-    # Of 14 simulated gloves no delay saved more than 4 % of what was left once they had either (2026-11-24).
-    rest_unlike: ClassVar = ("lag", "clock_offset", "glove_latency")
-    parameters: ClassVar = (
-        Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),
-        Parameter("middle_tau", "s", 0.5, 60.0, "1 to 60 s"),
-        Parameter("slow_tau", "s", 0.5, 60.0, "1 to 60 s"),
+    about = About(
+        "After a movement the reading goes on drifting for seconds although the joint is held.",
+        source="standard linear solid, relaxations of 1 to 40 s: Springer 10.1007/978-3-030-25261-8_34",
+        shown_over="hold",
+        shows_in=("direction", "time in take"),
+        shown_by=RAMPS,
+        in_holds=DriftInHolds("begins anew with each hold", "creep"),
     )
+    shape = Series(
+        (
+            Parameter("fast_tau", "s", 0.4, 60.0, "1 to 60 s"),
+            Parameter("middle_tau", "s", 0.5, 60.0, "1 to 60 s"),
+            Parameter("slow_tau", "s", 0.5, 60.0, "1 to 60 s"),
+        )
+    )
+    further = FurtherRelaxations()
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         longest = max((float(take.time_s[-1] - take.time_s[0]) for take in takes), default=0.0)
@@ -62,17 +78,8 @@ class Creep(ArrayStateEffect):
         """Of the slowest relaxation, those beside the shape's among them."""
         return super().transient_s(shape, settings) * max([1.0, *_beside(settings)])
 
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        longest = max(float(take.time_s[-1] - take.time_s[0]) for take in takes)
-        slow = np.array([tau for tau in SLOW_S if tau <= LONGEST_SHARE * longest] or SLOW_S[:1])
-        series = slow[:, None] / RATIO ** np.arange(2, -1, -1)
-        return np.repeat(series[:, None, :], takes[0].own.shape[1], axis=1)
-
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         return fit_joint_units(takes)
-
-    def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
-        return self.fit_constants(takes) | {"beside": list(BESIDE), "fastest_s": FASTEST_S}
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         usual = on_lanes(settings["own_centre_deg"], len(own)) if "own_centre_deg" in settings else own
@@ -101,25 +108,20 @@ class Creep(ArrayStateEffect):
         states = relax(state, elapsed_s, towards, _times(shape, settings))
         return np.subtract(states, _without(towards, settings), out=states)
 
-    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {name: columns[:, :, at] for at, name in enumerate(("fast", "middle", "slow"))}
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
+        each = {name: columns[:, :, at] for at, name in enumerate(PARTS)}
+        return FormSignals(each, "deg")
 
-    def prior_sd(self, settings: Settings) -> np.ndarray:
+    def weights(self, settings: Settings) -> Weights:
         beside = np.array(_beside(settings))
         further = np.where(beside > 1.0, SLOWEST_SD, 1.0)
-        return np.concatenate([np.ones(6), further, further[beside > 1.0]])
-
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return (
-            "fast_share_deg_per_deg",
-            "middle_share_deg_per_deg",
-            "slow_share_deg_per_deg",
-            "fast_start_deg_per_deg",
-            "middle_start_deg_per_deg",
-            "slow_start_deg_per_deg",
-            *(f"share_of_{times:.3g}_slow_deg_per_deg" for times in _beside(settings)),
-            *(f"start_of_{times:.3g}_slow_deg_per_deg" for times in _beside(settings) if times > 1.0),
+        names = (
+            *(f"{part}_share_deg_per_deg" for part in PARTS),
+            *(f"{part}_start_deg_per_deg" for part in PARTS),
+            *(f"share_of_{times:.3g}_slow_deg_per_deg" for times in beside),
+            *(f"start_of_{times:.3g}_slow_deg_per_deg" for times in beside if times > 1.0),
         )
+        return Weights(names, np.concatenate([np.ones(6), further, further[beside > 1.0]]))
 
 
 def _beside(settings: Settings) -> Sequence[float]:

@@ -6,16 +6,16 @@ Neff 2013, Table 1). Signals that the base already reads are left out by whoever
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Control, Rival, Settings
-from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
-from glovecal_models.effects.base.motions import CUPPED_PALM, ONE_FINGER
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.comparison import EffectComparison
+from glovecal_models.effects.base.dynamics import InstantEffect
+from glovecal_models.effects.base.effect import FormSignals
+from glovecal_models.effects.base.facts import About, Weights
+from glovecal_models.effects.base.relations import ONE_FINGER
+from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, in_joint_units
 
 PRIOR_DEG = 3.0
 PALM = "PALM_ARCH"
@@ -24,29 +24,21 @@ PALM = "PALM_ARCH"
 
 class CrossCoupling(InstantEffect):
     name = "cross_coupling"
-    explanation = "Moving a neighbouring joint changes what this sensor reads."
-    source = "Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004"
-    form_unit: ClassVar[str] = "SD"
-    one_joint_at_a_time: ClassVar[bool] = True
-    shows_in: ClassVar = ("joint", "sensor")
-    shown_over: ClassVar = "neighbour"
-    shown_by: ClassVar = ONE_FINGER
-    rivals: ClassVar = (Rival("palm_arch", CUPPED_PALM), Rival("contact_pressure", ONE_FINGER))
-    caveat = "a common cause that was not recorded, such as grip pressure or a strap, looks the same"
-    control: ClassVar[Control] = "circularly shifted"
+    about = About(
+        "Moving a neighbouring joint changes what this sensor reads.",
+        source="Wang & Neff 2013, section 3.1 and Table 1; Kahlesz, Zachmann, Klein 2004",
+        shown_over="neighbour",
+        shows_in=("joint", "sensor"),
+        shown_by=ONE_FINGER,
+    )
+    comparison = EffectComparison("circularly shifted", is_joint_by_joint=True)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return None if any(take.others for take in takes) else "no other sensor was recorded"
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         names = list(dict.fromkeys(name for take in takes for name in take.others if name != PALM))
-        return {
-            "neighbours": names,
-            **fit_joint_units(takes),
-        }
-
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        return np.zeros((1, takes[0].own.shape[1], 0))
+        return {"neighbours": names, **fit_joint_units(takes)}
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         lanes = take.own.shape[1]
@@ -58,12 +50,10 @@ class CrossCoupling(InstantEffect):
         np.multiply(result[:, :, : len(names)], joint, out=result[:, :, len(names) :])
         return result
 
-    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {name: columns[:, :, at] for at, name in enumerate(settings["neighbours"])}
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
+        return FormSignals({name: columns[:, :, at] for at, name in enumerate(settings["neighbours"])}, "SD")
 
-    def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.full(2 * len(settings["neighbours"]), PRIOR_DEG)
-
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+    def weights(self, settings: Settings) -> Weights:
         names = settings["neighbours"]
-        return (*(f"deg_per_sd[{name}]" for name in names), *(f"deg_per_sd[{name} x own]" for name in names))
+        products = (f"deg_per_sd[{name} x own]" for name in names)
+        return Weights((*(f"deg_per_sd[{name}]" for name in names), *products), PRIOR_DEG)

@@ -1,7 +1,7 @@
 """Donning shift: each time the glove is put on, offset and gain of every sensor are a little different.
 
 A random effect: one offset and one gain per wearing, shrunk towards none, and where the takes ask for it a
-smooth curve along the bend (base/wearing_curves.py). A wearing that training never saw gets none, and an
+smooth curve along the bend (``WearingCurves``). A wearing that training never saw gets none, and an
 interval as wide as wearings differ, until a quick check takes a few poses with known angles in it
 (quick_check/): it tells offset and gain.
 """
@@ -9,32 +9,64 @@ interval as wide as wearings differ, until a quick check takes a few poses with 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Certainty, Control, Rival, Settings
-from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
-from glovecal_models.effects.base.motions import CROSSED
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, curves_over, possible_curves
-from glovecal_models.effects.base.wearing_effect import PRIOR_DEG, WearingEffect
+from glovecal_models.effects.base.comparison import EffectComparison
+from glovecal_models.effects.base.effect import FurtherColumns
+from glovecal_models.effects.base.facts import About, Certainty, Weights
+from glovecal_models.effects.base.relations import CROSSED
+from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, in_joint_units
+from glovecal_models.effects.base.wearing_effect import (
+    CURVES,
+    PRIOR_DEG,
+    WearingCurves,
+    WearingEffect,
+    WeightsOfShifts,
+    curves_over,
+    possible_curves,
+)
+
+
+class FurtherCurves(FurtherColumns):
+    """A curve for each wearing along the bend."""
+
+    def choices(self, takes: Sequence[Signals], settings: Settings) -> list[Settings]:
+        return [{**settings, CURVES: curves} for curves in possible_curves(takes, settings["wearings"])]
+
+    def as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
+        curves, wearings = WearingCurves.of_settings(stored), settings["wearings"]
+        if curves is None or len(wearings) < 2:
+            return settings
+        return {**settings, CURVES: curves_over(curves.form.terms, takes, wearings)}
+
+    def described(self, names: Sequence[str], settings: Settings, weights: np.ndarray) -> dict[str, float]:
+        """Offsets and gains, and how large each curve is: its weights say nothing to a reader."""
+        curves, own = WearingCurves.of_settings(settings), 2 * len(settings["wearings"])
+        numbers = super().described(names[:own], settings, weights[:own])
+        if curves is None:
+            return numbers
+        sizes = curves.size_deg(weights[None, own:])[0]
+        named = zip(curves.wearings, map(float, sizes), strict=True)
+        return numbers | {f"curve_rms_deg[{name}]": size for name, size in named}
 
 
 class DonningShift(WearingEffect):
     name = "donning_shift"
-    explanation = "Putting the glove on again shifts and stretches what its sensors read."
-    source = "offset about 3.5 deg from day to day: Gracia-Ibanez 2016; random effect per wearing"
-    shown_by: ClassVar = CROSSED
-    shows_in: ClassVar = ("wearing",)
-    shown_over: ClassVar = "wearing"
-    rivals: ClassVar = tuple(
-        Rival(name, CROSSED) for name in ("warmup_drift", "temperature", "humidity", "supply_sag")
+    about = About(
+        "Putting the glove on again shifts and stretches what its sensors read.",
+        source="offset about 3.5 deg from day to day: Gracia-Ibanez 2016; random effect per wearing",
+        shown_over="wearing",
+        shows_in=("wearing",),
+        shown_by=CROSSED,
     )
-    certainty: ClassVar = Certainty(
-        clear=0.04, faint=0.01, why="there is one column of wearings, but context columns have many names"
+    comparison = EffectComparison(
+        "permuted wearings",
+        certainty=Certainty(
+            clear=0.04, faint=0.01, why="there is one column of wearings, but context columns have many names"
+        ),
     )
-    control: ClassVar[Control] = "permuted wearings"
+    further = FurtherCurves()
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         wearings = len({take.wearing for take in takes})
@@ -45,13 +77,7 @@ class DonningShift(WearingEffect):
         return None
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
-        return {
-            "wearings": list(dict.fromkeys(take.wearing for take in takes)),
-            **fit_joint_units(takes),
-        }
-
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        return np.zeros((1, takes[0].own.shape[1], 0))
+        return {"wearings": list(dict.fromkeys(take.wearing for take in takes)), **fit_joint_units(takes)}
 
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         wearings, curves = settings["wearings"], WearingCurves.of_settings(settings)
@@ -65,34 +91,15 @@ class DonningShift(WearingEffect):
             result[:, :, 2 * len(wearings) :] = curves.columns(take.own, take.wearing)
         return result
 
-    def settings_with_curves(self, takes: Sequence[Signals], settings: Settings) -> list[Settings]:
-        return [{**settings, CURVES: curves} for curves in possible_curves(takes, settings["wearings"])]
-
-    def settings_as_stored(self, takes: Sequence[Signals], settings: Settings, stored: Settings) -> Settings:
-        curves, wearings = WearingCurves.of_settings(stored), settings["wearings"]
-        if curves is None or len(wearings) < 2:
-            return settings
-        return {**settings, CURVES: curves_over(curves.form.terms, takes, wearings)}
-
-    def prior_sd(self, settings: Settings) -> np.ndarray:
-        curves = WearingCurves.of_settings(settings)
-        own = np.full(2 * len(settings["wearings"]), PRIOR_DEG)
-        return np.append(own, np.ones(curves.count)) if curves else own
-
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+    def weights(self, settings: Settings) -> Weights:
         wearings, curves = settings["wearings"], WearingCurves.of_settings(settings)
-        return (
-            *(f"offset_deg[{name}]" for name in wearings),
-            *(f"gain_deg_per_sd[{name}]" for name in wearings),
-            *(f"curve[{number}]" for number in range(curves.count if curves else 0)),
+        count = curves.count if curves else 0
+        return Weights(
+            (
+                *(f"offset_deg[{name}]" for name in wearings),
+                *(f"gain_deg_per_sd[{name}]" for name in wearings),
+                *(f"curve[{number}]" for number in range(count)),
+            ),
+            np.append(np.full(2 * len(wearings), PRIOR_DEG), np.ones(count)),
+            WeightsOfShifts(settings),
         )
-
-    def described(self, settings: Settings, shape: np.ndarray, weights: np.ndarray) -> dict[str, float]:
-        """Offsets and gains, and how large each curve is: its weights say nothing to a reader."""
-        curves, own = WearingCurves.of_settings(settings), 2 * len(settings["wearings"])
-        numbers = dict(zip(self.weight_names(settings)[:own], map(float, weights[:own]), strict=True))
-        if curves is None:
-            return numbers
-        sizes = curves.size_deg(weights[None, own:])[0]
-        named = zip(curves.wearings, map(float, sizes), strict=True)
-        return numbers | {f"curve_rms_deg[{name}]": size for name, size in named}

@@ -8,16 +8,15 @@ joint too: loops may be wider at one end, or cross in mid-range (butterfly).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Parameter, Rival, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect, unbroken
-from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
-from glovecal_models.effects.base.motions import RAMPS
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.dynamics import ArrayStateEffect, unbroken
+from glovecal_models.effects.base.effect import CorrectionEffect, FormSignals, FurtherColumns
+from glovecal_models.effects.base.facts import About, Parameter, Shape, Weights
+from glovecal_models.effects.base.relations import RAMPS
+from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, in_joint_units
 
 WIDTHS = (0.2, 0.5, 1.0)
 """Of the widest play: enough to name it, and what models had that were stored without widths."""
@@ -35,42 +34,41 @@ SHORTEST_FOR_PRODUCTS_S = 5.0
 the cycle's phase, and anything that goes with the phase would bear the name."""
 
 
+class Widest(Shape):
+    """Of the motion's own spread."""
+
+    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
+        spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
+        return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
+
+
+class MorePlays(FurtherColumns):
+    """Without products with the joint: a learned form brings those."""
+
+    def constants(self, effect: CorrectionEffect, takes: Sequence[Signals]) -> Settings:
+        return {"widths": list(REPAIR_WIDTHS)}
+
+
 class Hysteresis(ArrayStateEffect):
     name = "hysteresis"
-    explanation = (
-        "The sensor sticks: at the same angle it reads differently on the way up and on the way down."
+    about = About(
+        "The sensor sticks: at the same angle it reads differently on the way up and on the way down.",
+        source="Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008",
+        shown_over="angle both ways",
+        shows_in=("direction", "speed"),
+        shown_by=RAMPS,
     )
-    source = "Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008"
-    form_unit: ClassVar[str] = "deg"
-    shown_by: ClassVar = RAMPS
-    shows_in: ClassVar = ("direction", "speed")
-    shown_over: ClassVar = "angle both ways"
-    rivals: ClassVar = tuple(
-        # Slow turns show all of it and nothing of a delay.
-        Rival(name, RAMPS)
-        for name in ("creep", "lag", "clock_offset", "glove_latency")
-    )
-    rest_like: ClassVar = ("creep",)
-    # Of 14 simulated gloves no delay saved more than 4 % of what was left once they had either (2026-11-24).
-    rest_unlike: ClassVar = ("lag", "clock_offset", "glove_latency")
-    parameters: ClassVar = (Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),)
+    shape = Widest((Parameter("widest_play", "deg", 0.2, 30.0, "1 to 7 deg in bend sensors"),))
+    further = MorePlays()
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if any(_turns(take) >= FEWEST_TURNS for take in takes):
             return None
         return "no joint goes to and fro in these takes"
 
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        spread = np.sqrt(np.mean([take.own.var(axis=0) for take in takes], axis=0))
-        return np.array(WIDEST_SHARES)[:, None, None] * spread[None, :, None]
-
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         longest_s = max(float(np.ptp(take.time_s)) for take in takes)
         return fit_joint_units(takes) if longest_s >= SHORTEST_FOR_PRODUCTS_S else {}
-
-    def fit_repair_constants(self, takes: Sequence[Signals]) -> Settings:
-        """A learned form brings the products with the joint."""
-        return {"widths": list(REPAIR_WIDTHS)}
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         return np.repeat(own[:, None], len(_widths(settings)), axis=1)
@@ -116,14 +114,15 @@ class Hysteresis(ArrayStateEffect):
             result[part] = moved < 2.0 * shape[:, 0]
         return result
 
-    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
         widths = list(enumerate(_widths(settings)))
         every = max(len(widths) // MOST_FORM_PLAYS, 1)
-        return {f"play {width:g}": columns[:, :, at] for at, width in widths[every - 1 :: every]}
+        plays = {f"play {width:g}": columns[:, :, at] for at, width in widths[every - 1 :: every]}
+        return FormSignals(plays, "deg")
 
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
+    def weights(self, settings: Settings) -> Weights:
         names = tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
-        return (*names, *(f"{name}_per_sd" for name in names)) if _has_products(settings) else names
+        return Weights((*names, *(f"{name}_per_sd" for name in names)) if _has_products(settings) else names)
 
 
 def _widths(settings: Settings) -> Sequence[float]:

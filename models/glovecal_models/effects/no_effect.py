@@ -1,16 +1,9 @@
-"""No effect: the calibration as it is, as an object that answers like every other."""
+"""No effect: the calibration as it is, as an object of a name like every other."""
 
-from __future__ import annotations
-
-from typing import ClassVar
-
-from glovecal_models.effects.base.effect import ColumnlessEffect
-from glovecal_models.effects.base.facts import Kind, Stage
+from glovecal_models.effects.base.effect import Effect
+from glovecal_models.effects.base.facts import About
 
 
-class NoEffect(ColumnlessEffect):
+class NoEffect(Effect):
     name = "no_effect"
-    explanation = "Nothing is missing: what remains is noise."
-    source = "the null hypothesis"
-    kind: ClassVar[Kind] = "nothing"
-    stage: ClassVar[Stage] = "never"
+    about = About("Nothing is missing: what remains is noise.", source="the null hypothesis")

@@ -6,17 +6,17 @@ its ends outside. Constant and slope are left out: the base has them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Control, Settings
-from glovecal_models.effects.base.joint_units import on_lanes
+from glovecal_models.effects.base.comparison import EffectComparison
+from glovecal_models.effects.base.dynamics import InstantEffect
+from glovecal_models.effects.base.effect import FormSignals
+from glovecal_models.effects.base.facts import About, Weights
 from glovecal_models.effects.base.learned_form import OWN
-from glovecal_models.effects.base.motions import RAMPS
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.relations import RAMPS
+from glovecal_models.effects.base.signals import Settings, Signals, on_lanes
 
 DEGREES = (2, 3, 4, 5, 6, 7)
 PRIOR_DEG = 20.0
@@ -27,12 +27,13 @@ LEAST_RANGE_DEG = 5.0
 
 class Nonlinearity(InstantEffect):
     name = "nonlinearity"
-    explanation = "The sensor is not proportional: the same movement reads differently in another posture."
-    source = "smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004"
-    shown_by: ClassVar = RAMPS
-    shows_in: ClassVar = ("angle",)
-    learned_by: ClassVar[str | None] = "lmc_gpr"
-    control: ClassVar[Control] = "circularly shifted"
+    about = About(
+        "The sensor is not proportional: the same movement reads differently in another posture.",
+        source="smooth curve of the joint; bend sensors are curved: Kahlesz, Zachmann, Klein 2004",
+        shows_in=("angle",),
+        shown_by=RAMPS,
+    )
+    comparison = EffectComparison("circularly shifted")
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if not takes:
@@ -47,23 +48,18 @@ class Nonlinearity(InstantEffect):
         low, high = _range(takes)
         return {"own_low_deg": low.tolist(), "own_high_deg": high.tolist()}
 
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        return np.zeros((1, takes[0].own.shape[1], 0))
-
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         lanes = take.own.shape[1]
         low, high = on_lanes(settings["own_low_deg"], lanes), on_lanes(settings["own_high_deg"], lanes)
         place = np.clip(2.0 * (take.own - low) / np.maximum(high - low, 1e-6) - 1.0, -1.0, 1.0)
         return _legendre(place)
 
-    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {OWN: take.own}
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
+        return FormSignals({OWN: take.own})
 
-    def prior_sd(self, settings: Settings) -> np.ndarray:
-        return PRIOR_DEG / np.array(DEGREES, dtype=float)
-
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"legendre_{degree}_deg" for degree in DEGREES)
+    def weights(self, settings: Settings) -> Weights:
+        names = tuple(f"legendre_{degree}_deg" for degree in DEGREES)
+        return Weights(names, PRIOR_DEG / np.array(DEGREES, dtype=float))
 
 
 def _range(takes: Sequence[Signals]) -> tuple[np.ndarray, np.ndarray]:

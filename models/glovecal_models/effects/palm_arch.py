@@ -8,15 +8,16 @@ square of the palm sensor follows the hollow where it is a cylinder's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import InstantEffect
-from glovecal_models.effects.base.facts import Control, Settings
-from glovecal_models.effects.base.motions import CUPPED_PALM
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.comparison import EffectComparison
+from glovecal_models.effects.base.dynamics import InstantEffect
+from glovecal_models.effects.base.effect import FormSignals
+from glovecal_models.effects.base.facts import About, Weights
+from glovecal_models.effects.base.relations import CUPPED_PALM
+from glovecal_models.effects.base.signals import Settings, Signals
 
 PALM = "PALM_ARCH"
 SIGNALS = (PALM, "T_TMC", "TI_ABD")
@@ -24,15 +25,15 @@ SIGNALS = (PALM, "T_TMC", "TI_ABD")
 
 class PalmArch(InstantEffect):
     name = "palm_arch"
-    explanation = "Hollowing the palm pulls at this sensor, most of all at thumb and little finger."
-    source = "Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5"
-    form_unit: ClassVar[str] = "SD"
-    one_joint_at_a_time: ClassVar[bool] = True
-    shows_in: ClassVar = (f"sensor {PALM}", f"joint {PALM}")
-    shown_over: ClassVar = "neighbour"
-    neighbours: ClassVar = (PALM,)
-    shown_by: ClassVar = CUPPED_PALM
-    control: ClassVar[Control] = "circularly shifted"
+    about = About(
+        "Hollowing the palm pulls at this sensor, most of all at thumb and little finger.",
+        source="Krnoul, Kanis, Zelezny, Muller 2016, section 3.3.3, equations 2 to 5",
+        shown_over="neighbour",
+        neighbours=(PALM,),
+        shows_in=(f"sensor {PALM}", f"joint {PALM}"),
+        shown_by=CUPPED_PALM,
+    )
+    comparison = EffectComparison("circularly shifted", is_joint_by_joint=True)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         known = [take.others[PALM] for take in takes if PALM in take.others]
@@ -51,19 +52,16 @@ class PalmArch(InstantEffect):
                 ranges[name] = [float(values.min()), float(values.max())]
         return {"signals": ranges}
 
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        return np.zeros((1, takes[0].own.shape[1], 0))
-
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         rest = np.zeros(len(take))
-        result = np.empty((len(take), take.own.shape[1], len(self.weight_names(settings))))
+        result = np.empty((len(take), take.own.shape[1], 1 + len(settings["signals"])))
         for column, (name, (low, high)) in enumerate(settings["signals"].items()):
             result[:, :, column] = np.clip(take.others.get(name, rest), low, high)[:, None]
         result[:, :, -1] = result[:, :, list(settings["signals"]).index(PALM)] ** 2
         return result
 
-    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> Mapping[str, np.ndarray]:
-        return {name: columns[:, :, at] for at, name in enumerate(settings["signals"])}
+    def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
+        return FormSignals({name: columns[:, :, at] for at, name in enumerate(settings["signals"])}, "SD")
 
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return (*(f"deg_per_sd[{name}]" for name in settings["signals"]), f"deg_per_sd2[{PALM}]")
+    def weights(self, settings: Settings) -> Weights:
+        return Weights((*(f"deg_per_sd[{name}]" for name in settings["signals"]), f"deg_per_sd2[{PALM}]"))

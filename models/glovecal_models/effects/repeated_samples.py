@@ -16,18 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.special import bdtrc
 
-from glovecal_models.effects.base.facts import Kind, Settings
-from glovecal_models.effects.base.signature_effect import (
-    Finding,
-    SignatureEffect,
-    check_signature_input,
-    named,
-)
+from glovecal_models.effects.base.effect import RepairEffect
+from glovecal_models.effects.base.facts import About
+from glovecal_models.effects.base.findings import Finding, check_signature_input, named
+from glovecal_models.effects.base.signals import Settings
 from glovecal_models.takes.reading_faults import replayed, smallest_step
 from glovecal_models.takes.take import Take
 
@@ -91,12 +87,13 @@ class Repeats:
         return self.interrupted / max(self.interrupted + self.moving, 1)
 
 
-class RepeatedSamples(SignatureEffect):
+class RepeatedSamples(RepairEffect):
     name = "repeated_samples"
-    explanation = "Lost samples were filled with the one before: the recording halts and jumps."
-    source = "padded samples of recorders without synchronisation: docs.optitrack.com, Manus in Motive"
-    kind: ClassVar[Kind] = "repair"
-    shown_over: ClassVar = "time in take"
+    about = About(
+        "Lost samples were filled with the one before: the recording halts and jumps.",
+        source="padded samples of recorders without synchronisation: docs.optitrack.com, Manus in Motive",
+        shown_over="time in take",
+    )
 
     def find(
         self,

@@ -12,23 +12,65 @@ The palm is rigid, or it arches: then the little finger's metacarpal turns about
 The first joint's parent is the forearm. A joint's angle is a weighted sum of rotations: the spread between
 ring and middle finger carries the pinky too, so the pinky's spread is ``MR_ABD`` + ``RP_ABD``. The middle
 finger is what the others spread from.
+
+About which axes the thumb's two sensors turn its metacarpal: a rotation of that bone's local frame.
+
+Krnoul et al. 2016, section 3.3.2: bones of character models turn about their own direction, which does not
+suit the thumb. A post-rotation of the bone's frame makes the roll sensor turn about x alone, and the
+abduction sensor about y alone. The paper's angles, (-39, -13, 27) degrees for the right hand, belong to its
+tool's frame, and it does not tell the order of the three turns: they are a setting here (``PAPER_DEG`` and an
+order), and no default. Ours follows from what the sensors do: the frame whose x and y are the two axes of the
+skeleton. The left hand is the mirror image, axes and all.
+
+The skeleton as JSON, for viewers in any language (format ``glovecal.skeleton.v1``).
+
+    format       "glovecal.skeleton.v1"
+    hand         "right" or "left"
+    length_unit, angle_unit   "mm", "deg"
+    dimensions   every size of the hand, and which of them were measured
+    rotations    name, low and high limit; what stands in when it is not measured: a weighted sum of other
+                 rotations (rule), or an angle (rest)
+    joints       parents before children: name, parent (null for the forearm), offset, orientation
+                 (quaternion w, x, y, z), axis, rotations (the joint's angle is the sum of weight x rotation)
+    tips         finger, joint it hangs on, offset in that joint's frame
+
+    frame(joint) = frame(parent) . translate(offset) . orient(orientation) . turn(axis, angle)
+
+Right-handed frames, positive angles by the right-hand rule. Origin at the wrist's centre, x along the middle
+metacarpal to the fingers, z out of the back of the hand; y points to the thumb of a right hand.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import Handedness
-from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS, PALM, WRIST
-from glovecal_models.hand.thumb_axes import ThumbAxes
+from glovecal_models.hand.rotations import (
+    ACTIVE_RANGE_DEG,
+    ARCHING_ROTATIONS,
+    FINGERS,
+    FLAT_PALM_DEG,
+    HAND_ROTATIONS,
+    PALM,
+    REST_DEG,
+    RULES,
+    WRIST,
+    Handedness,
+)
+from glovecal_models.names import did_you_mean
 
+PAPER_DEG = (-39.0, -13.0, 27.0)
+ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+"""Each turn about an axis of the frame that the turns before have left."""
+Axis = tuple[float, float, float]
 Palm = Literal["rigid", "arching"]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -55,6 +97,49 @@ PALM_SLANT_DEG = 35.0
 arches also turns the little finger to the thumb. Ours; the paper gives no axis. About 25 degrees of arch
 (``hand_ranges``) its knuckle comes some 22 mm out of the palm's plane.
 """
+FORMAT = "glovecal.skeleton.v1"
+
+
+@dataclass(frozen=True)
+class ThumbAxes:
+    """In the frame of the closed thumb's metacarpal: x along the bone, z out of its nail's side."""
+
+    roll: Axis
+    """About which the roll sensor's rotation turns (T_TMC), a unit vector."""
+    abduction: Axis
+    """Of the thumb-index abduction (TI_ABD), across ``roll``."""
+
+    @classmethod
+    def rotated(cls, angles_deg: Sequence[float], order: str) -> ThumbAxes:
+        """x and y of a frame turned by ``angles_deg`` about x, y and z, one after another in ``order``.
+
+        Raises BadInput for another order, and for angles that are not three finite numbers.
+        """
+        from scipy.spatial.transform import Rotation  # slow to load, and seldom needed
+
+        if order not in ORDERS:
+            raise BadInput(f"order of the thumb's turns is {order!r}; {did_you_mean(order, ORDERS)}")
+        if len(angles_deg) != 3 or not np.isfinite(angles_deg).all():
+            raise BadInput(
+                f"the thumb's post-rotation is {tuple(angles_deg)}, expected three angles, degrees"
+            )
+        by_axis = dict(zip("XYZ", angles_deg, strict=True))
+        turned = Rotation.from_euler(order, [by_axis[axis] for axis in order], degrees=True).as_matrix()
+        x, y, _ = turned.T.tolist()
+        return cls(tuple(x), tuple(y))
+
+    def angles_deg(self, order: str) -> Axis:
+        """The post-rotation about x, y and z that ``rotated`` makes these axes of."""
+        from scipy.spatial.transform import Rotation
+
+        if order not in ORDERS:
+            raise BadInput(f"order of the thumb's turns is {order!r}; {did_you_mean(order, ORDERS)}")
+        frame = np.column_stack([self.roll, self.abduction, np.cross(self.roll, self.abduction)])
+        with warnings.catch_warnings():  # where the middle turn is 90 degrees, one of many answers is given
+            warnings.simplefilter("ignore", UserWarning)
+            turned = Rotation.from_matrix(frame).as_euler(order, degrees=True)
+        found = dict(zip(order, turned.tolist(), strict=True))
+        return found["X"], found["Y"], found["Z"]
 
 
 @dataclass(frozen=True)
@@ -260,3 +345,42 @@ def _mirrored(right: Skeleton) -> Skeleton:
     ]
     tips = [replace(tip, offset_mm=place(tip.offset_mm)) for tip in right.tips]
     return Skeleton("left", right.dimensions, tuple(joints), tuple(tips))
+
+
+def skeleton_document(skeleton: Skeleton) -> dict[str, Any]:
+    """Plain JSON-able data."""
+    return {
+        "format": FORMAT,
+        "hand": skeleton.hand,
+        "length_unit": "mm",
+        "angle_unit": "deg",
+        "dimensions": {
+            "sizes": dict(skeleton.dimensions.sizes_mm),
+            "measured": list(skeleton.dimensions.measured),
+        },
+        "rotations": [_rotation(name) for name in skeleton.rotations],
+        "joints": [
+            {
+                "name": joint.name,
+                "parent": joint.parent,
+                "offset": list(joint.offset_mm),
+                "orientation": list(joint.orientation),
+                "axis": list(joint.axis),
+                "rotations": dict(joint.rotations),
+            }
+            for joint in skeleton.joints
+        ],
+        "tips": [
+            {"finger": FINGERS[tip.finger], "joint": tip.joint, "offset": list(tip.offset_mm)}
+            for tip in skeleton.tips
+        ],
+    }
+
+
+def _rotation(name: str) -> dict[str, Any]:
+    low, high = ACTIVE_RANGE_DEG[name]
+    if name in RULES:
+        missing = {"rule": RULES[name], "rest": None}
+    else:
+        missing = {"rule": None, "rest": FLAT_PALM_DEG if name == PALM else REST_DEG[name]}
+    return {"name": name, "low": low, "high": high, **missing}

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.calibration.effect_fit import optima_of
-from glovecal_models.calibration.held_out_check import HeldOutErrors, held_out_errors
-from glovecal_models.calibration.left_out_wearings import left_out_wearings
+from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors, left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import (
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.training import noise_of, train
+from glovecal_models.calibration.training_plan import UsableSensors, usable_sensors
+from glovecal_models.calibration.training_settings import (
+    TrainingSettings,
     repaired_takes,
     requested_effects,
     settings_of,
     trained_rotations,
 )
-from glovecal_models.calibration.prepared_takes import PreparedTakes
-from glovecal_models.calibration.training import noise_of, train
-from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.unseen_wearing import unseen_wearing
-from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
@@ -32,20 +31,29 @@ from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
-from glovecal_models.diagnosis.text import action_sentence
-from glovecal_models.effects.base.signature_effect import FoundBefore, SignatureEffect
+from glovecal_models.diagnosis.text import remedy
+from glovecal_models.effects.base.effect import RepairEffect, is_asked_last
+from glovecal_models.effects.base.findings import FoundBefore
 from glovecal_models.effects.catalogue import catalogue, effect
-from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.control_share import share_in
-from glovecal_models.improvement.improvement import AddedInStep, Improvement, Step, Stop, Trial
+from glovecal_models.improvement.add_effect import Proposed, add_effect, repairs, widenings
+from glovecal_models.improvement.addition import share_in
+from glovecal_models.improvement.answer import AddedInStep
+from glovecal_models.improvement.improvement import (
+    Improvement,
+    Step,
+    Stop,
+    Trial,
+    added_in_step,
+    baselines,
+    step_errors,
+    why_stopped,
+)
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
-from glovecal_models.improvement.proposals import Proposed, repairs, widenings
 from glovecal_models.improvement.remove_effect import without_redundant
-from glovecal_models.improvement.step_errors import baselines, step_errors, why_stopped
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_warnings import take_warnings
+from glovecal_models.takes.take_check import take_warnings
 
 
 def improve(
@@ -73,59 +81,48 @@ def improve(
     odd = odd_takes(takes, layout)
     if len(take_hashes) == len(takes):
         take_hashes = fitting(take_hashes, odd)
+    takes, usable = fitting(takes, odd), usable_sensors(layout, fitting(takes, odd))
     loop = _Loop(
-        fitting(takes, odd),
-        layout,
-        subject,
-        settings,
-        tuple(holdout),
-        seed,
-        tuple(take_hashes),
-        limits,
-        cancelled,
-        report,
-    )
-    loop.odd_takes = odd
+        takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
+        cancelled, report,
+    )  # fmt: skip
     loop.start()
     while len(loop.steps) <= max_steps and loop.go_on():
         pass
     return loop.finished(ceiling=ceiling)
 
 
+@dataclass
 class _Loop:
     """The state of one loop."""
 
-    def __init__(
-        self,
-        takes: Sequence[Take],
-        layout: Layout,
-        subject: str,
-        settings: TrainingSettings,
-        holdout: tuple[Take, ...],
-        seed: int,
-        hashes: tuple[str, ...],
-        limits: ImprovementLimits,
-        cancelled: Cancel | None,
-        report: Report | None,
-    ) -> None:
-        self.takes, self.subject, self.settings = list(takes), subject, settings
-        self.usable = usable_sensors(layout, takes)
-        self.layout = self.usable.layout
-        self.holdout, self.seed, self.hashes = holdout, seed, hashes
-        self.limits, self.cancelled, self.report = limits, cancelled, report
-        self.steps: list[Step] = []
-        self.trials: list[Trial] = []
-        self.followed: set[tuple[str, str]] = set()
-        """Effects and rotations that a residual's association asked for."""
-        self.stopped: Stop = "nothing_named"
-        self.diagnosis: Diagnosis | None = None
-        self.diagnosed: list[Take] = []
-        """The takes of the diagnosis."""
-        self.errors = HeldOutErrors({}, {})
-        self.has_looked = False
-        self.found_before = FoundBefore()
-        self.odd_takes: tuple[OddTake, ...] = ()
-        """Set aside, as they do not fit the others."""
+    takes: list[Take]
+    usable: UsableSensors
+    odd_takes: tuple[OddTake, ...]
+    """Set aside, as they do not fit the others."""
+    subject: str
+    settings: TrainingSettings
+    holdout: tuple[Take, ...]
+    seed: int
+    hashes: tuple[str, ...]
+    limits: ImprovementLimits
+    cancelled: Cancel | None
+    report: Report | None
+    steps: list[Step] = field(default_factory=list)
+    trials: list[Trial] = field(default_factory=list)
+    followed: set[tuple[str, str]] = field(default_factory=set)
+    """Effects and rotations that a residual's association asked for."""
+    stopped: Stop = "nothing_named"
+    diagnosis: Diagnosis | None = None
+    diagnosed: list[Take] = field(default_factory=list)
+    """The takes of the diagnosis."""
+    errors: HeldOutErrors = field(default_factory=lambda: HeldOutErrors({}, {}))
+    has_looked: bool = False
+    found_before: FoundBefore = field(default_factory=FoundBefore)
+
+    @property
+    def layout(self) -> Layout:
+        return self.usable.layout
 
     def start(self) -> None:
         """The base model and its error."""
@@ -164,8 +161,8 @@ class _Loop:
             where = [item.joints[i] for i in item.significant_joints]
             tried_effect = self.diagnosis.effects[item.effect]
             constants = None if item.steps is None else item.steps.to_settings()
-            if isinstance(tried_effect, SignatureEffect):
-                constants = tried_effect.constants_of(item, [take.name for take in self.takes])
+            if isinstance(tried_effect, RepairEffect) and tried_effect.comparison is not None:
+                constants = tried_effect.comparison.constants(item, [take.name for take in self.takes])
             if self._add(item.effect, where, constants, self.diagnosis):
                 return True
             self.stopped = "not_better"
@@ -195,7 +192,7 @@ class _Loop:
     def _ceiling(self) -> Ceiling:
         return black_box_ceiling(
             self.steps[-1].model, self.takes, self.settings, seed=self.seed,
-            cancelled=self.cancelled, report=part(self.report, 0.9, 1.0, "ceiling"),
+            cancelled=self.cancelled, report=part(self._say, 0.9, 1.0, "ceiling"),
         )  # fmt: skip
 
     def _known_floors(self, takes: Sequence[Take]) -> Mapping[str, NoiseFloor] | None:
@@ -230,7 +227,7 @@ class _Loop:
         every = trained_rotations(model)
         chosen = (
             every
-            if where is None or effect(name).kind == "repair"
+            if where is None or isinstance(effect(name), RepairEffect)
             else [item for item in where if item in every]
         )
         concerned = set((constants or {}).get("where", chosen))
@@ -253,7 +250,7 @@ class _Loop:
             addition, self.takes, self.errors, self.settings, self.hashes, self.cancelled, self.limits
         )
         self.trials.append(Trial(addition, reasons, removed, diagnosis, action))
-        added = AddedInStep.of(addition, constants, diagnosis, confidence_set, action)
+        added = added_in_step(addition, constants, diagnosis, confidence_set, action)
         self._step(model, added)
         return True
 
@@ -263,7 +260,9 @@ class _Loop:
         if not asked or asked[0].effect is None or asked[0].effect in self._tried:
             return False
         where = [item.rotation for item in asked]
-        return self._add(asked[0].effect, where, None, diagnosis, tuple(map(action_sentence, asked)))
+        return self._add(
+            asked[0].effect, where, None, diagnosis, tuple(remedy(item).sentence for item in asked)
+        )
 
     def _add_associated(self, diagnosis: Diagnosis) -> bool:
         """The first effect of a column that the residual goes along with, if it stays; none that may only
@@ -274,16 +273,14 @@ class _Loop:
                 continue
             self.followed.add(pair)
             if self._add(
-                action.effect, [action.rotation], None, diagnosis, (action_sentence(action),), action=action
+                action.effect, [action.rotation], None, diagnosis, (remedy(action).sentence,), action=action
             ):
                 return True
         return False
 
     def _is_named_last(self, diagnosis: Diagnosis) -> bool:
         """Whether it names an effect that seems to be explained by those which it ranks, and is not."""
-        names = {
-            item.effect for item in diagnosis.signature if diagnosis.effects[item.effect].stage == "last"
-        }
+        names = {item.effect for item in diagnosis.signature if is_asked_last(diagnosis.effects[item.effect])}
         return bool(names - self._tried)
 
     def _add_widenings(self) -> bool:
@@ -303,9 +300,10 @@ class _Loop:
 
     @property
     def _not_repaired(self) -> set[str]:
-        """Repairs that are not looked for any more."""
-        signatures = [item for item in catalogue().values() if isinstance(item, SignatureEffect)]
-        once = {item.name for item in signatures if item.looked_for_once and self.has_looked}
+        """Repairs that are not looked for any more: the search of those that are compared takes long, and
+        finds the same after other effects were added."""
+        repairs = [item for item in catalogue().values() if isinstance(item, RepairEffect)]
+        once = {item.name for item in repairs if item.comparison is not None and self.has_looked}
         return self._tried | self._has | once
 
     @property
@@ -369,4 +367,14 @@ class _Loop:
 
     def _say(self, text: str, share: float) -> None:
         if self.report:
-            self.report(text, min(share, 1.0))
+            self.report(f"{self._fall_so_far}{text}", min(share, 1.0))
+
+    @property
+    def _fall_so_far(self) -> str:
+        """The held-out error of each step, and what was undone."""
+        fall = [
+            f"{'base' if step.added is None else f'+ {step.added.effect}'} {step.rmse_deg:.2f}°"
+            for step in self.steps
+        ]
+        undone = [f"{trial.addition.effect} undone" for trial in self.trials if not trial.addition.added]
+        return f"{', '.join([*fall, *dict.fromkeys(undone)])}: " if fall else ""

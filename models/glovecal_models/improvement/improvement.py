@@ -1,82 +1,70 @@
-"""What became of an improvement loop: its steps, every effect that was tried, and why it stopped."""
+"""What became of an improvement loop: its steps, every effect that was tried, and why it stopped.
+
+Errors of the models of an improvement, beside simpler calibrations and the noise floor; why it stopped.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
+from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.usable_sensors import UsableSensors
+from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_plan import UsableSensors
+from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
+from glovecal_models.comparison.noise_floor import is_at_floor as is_one_at_floor
+from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
-from glovecal_models.diagnosis.diagnosis import Diagnosis, Verdict
-from glovecal_models.diagnosis.next_take import NextTake, next_take
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.form_curve import LaneCurves
-from glovecal_models.effects.base.signature_effect import SignatureEffect
+from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.next_take import next_take
+from glovecal_models.diagnosis.residual_answer import NextTake
+from glovecal_models.effects.base.effect import RepairEffect
+from glovecal_models.effects.base.signals import Settings
 from glovecal_models.effects.catalogue import catalogue, effect
-from glovecal_models.improvement.addition import Addition, ClaimCheck
+from glovecal_models.improvement.addition import Addition
+from glovecal_models.improvement.answer import AddedInStep
+from glovecal_models.layout import Layout
+from glovecal_models.takes.take import Take
 
 Stop = Literal["noise_floor", "nothing_named", "ambiguous", "not_better"]
+SIMPLER: tuple[Method, ...] = ("raw", "linear")
 
 
-@dataclass(frozen=True)
-class AddedInStep:
-    """The effect that a step added."""
-
-    effect: str
-    where: tuple[str, ...]
-    confidence_set: tuple[str, ...]
-    """It and all that the takes could not tell from it."""
-    parameters: Mapping[str, Any]
-    """Learned numbers, units in their names; plain JSON-able data."""
-    claim: ClaimCheck | None = None
-    next_take: NextTake | None = None
-    """The recording that would tell the confidence set apart."""
-    associated_with: str | None = None
-    """The recorded column that the residual went along with, in words, where that is why it was added."""
-    control_share: float | None = None
-    """Of the error of its rotations that its control leaves; None where there is none."""
-    curves: Mapping[str, LaneCurves] = field(default_factory=dict)
-    """For each rotation what its learned form adds over its inputs."""
-
-    @property
-    def verdict(self) -> Verdict:
-        if self.associated_with is not None:
-            return "associated"
-        return "named" if len(self.confidence_set) < 2 else "ambiguous"
-
-    @classmethod
-    def of(
-        cls,
-        addition: Addition,
-        constants: Settings | None,
-        diagnosis: Diagnosis | None,
-        confidence_set: tuple[str, ...] = (),
-        action: Action | None = None,
-    ) -> AddedInStep:
-        """``constants``: with which it was added; ``diagnosis``: by which it was chosen, else with
-        ``confidence_set`` by its signature."""
-        name, known = addition.effect, effect(addition.effect)
-        rivals = confidence_set if diagnosis is None else diagnosis.naming.confidence_set
-        rivals = rivals if name in rivals else (name,)
-        parameters: Mapping[str, Any] = addition.parameters
-        if constants is not None and addition.claim is None and isinstance(known, SignatureEffect):
-            parameters = known.described_constants(constants)
-        following = next_take(rivals, catalogue()) if diagnosis is None else diagnosis.next_take
-        following = following if len(rivals) > 1 else None
-        where = tuple((constants or {}).get("where", addition.rotations))
-        if action is not None:
-            phrase = action.association.phrase
-            return cls(
-                name, where, (name,), parameters, None, None, phrase, addition.control_share, addition.curves
-            )
-        return cls(
-            name, where, rivals, parameters, addition.claim, following, None, addition.control_share,
-            addition.curves,
-        )  # fmt: skip
+def added_in_step(
+    addition: Addition,
+    constants: Settings | None,
+    diagnosis: Diagnosis | None,
+    confidence_set: tuple[str, ...] = (),
+    action: Action | None = None,
+) -> AddedInStep:
+    """``constants``: with which it was added; ``diagnosis``: by which it was chosen, else with
+    ``confidence_set`` by its signature; ``action``: the association for which it was tried."""
+    name, known = addition.effect, effect(addition.effect)
+    rivals = confidence_set if diagnosis is None else diagnosis.naming.confidence_set
+    rivals = rivals if name in rivals and action is None else (name,)
+    parameters: Mapping[str, Any] = addition.parameters
+    if constants is not None and addition.claim is None and isinstance(known, RepairEffect):
+        parameters = known.described(constants)
+    following = next_take(rivals, catalogue()) if diagnosis is None else diagnosis.next_take
+    return AddedInStep(
+        name,
+        tuple((constants or {}).get("where", addition.rotations)),
+        rivals,
+        parameters,
+        None if action is not None else addition.claim,
+        following if len(rivals) > 1 else None,
+        None if action is None else action.association.phrase,
+        addition.control_share,
+        addition.curves,
+    )
 
 
 @dataclass(frozen=True)
@@ -150,3 +138,73 @@ class Improvement:
             return self.diagnosis.next_take
         added = [step.added for step in reversed(self.steps) if step.added is not None]
         return next((item.next_take for item in added if item.verdict == "ambiguous"), None)
+
+
+def step_errors(
+    model: CalibrationModel, holdout: Sequence[Take], held_out: HeldOutErrors
+) -> tuple[dict[str, float], float]:
+    """RMSE, degrees, of each rotation and overall: on ``holdout`` when there is one, else ``held_out``."""
+    if not holdout:
+        return {name: held_out.rmse_deg(name) for name in held_out.square}, held_out.overall_deg
+    found = residuals(model, holdout)
+    error = found.stacked("error")
+    each = {
+        name: float(np.sqrt(np.nanmean(error[:, found.column(name)] ** 2)))
+        for name in found.measured_rotations
+    }
+    return each, float(np.sqrt(np.nanmean(error**2)))
+
+
+def is_at_floor(
+    rmse_deg: Mapping[str, float],
+    floors: Mapping[str, NoiseFloor],
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> bool:
+    """Whether every rotation whose floor is known is at it; False when none is."""
+    pairs = [(rmse_deg[name], floor) for name, floor in floors.items() if name in rmse_deg]
+    return bool(pairs) and all(is_one_at_floor(error, floor, limits) for error, floor in pairs)
+
+
+def baselines(
+    takes: Sequence[Take],
+    layout: Layout,
+    rotations: Sequence[str],
+    settings: TrainingSettings,
+    holdout: Sequence[Take],
+) -> dict[str, float]:
+    """RMSE in degrees by method, on ``holdout`` or, without one, on held-out takes."""
+    found: dict[str, float] = {}
+    for method in SIMPLER:
+        if method == settings.method:
+            continue
+        if holdout:
+            model = train(takes, layout, "baseline", TrainingSettings(method=method, folds=0))
+            error = residuals(model, holdout).stacked("error")
+            found[method] = float(np.sqrt(np.nanmean(error**2)))
+        else:
+            plain = TrainingSettings(method=method, folds=settings.folds)
+            prepared = PreparedTakes.of(takes, layout)
+            found[method] = held_out_errors(prepared, rotations, [], plain).overall_deg
+    return found
+
+
+def why_stopped(
+    stopped: Stop,
+    steps: Sequence[Step],
+    floors: Mapping[str, NoiseFloor],
+    diagnosis: Diagnosis | None,
+    limits: ComparisonLimits = COMPARISON_LIMITS,
+) -> Stop:
+    """``stopped`` so far ("nothing_named" or "not_better"), or what is known better of the end."""
+    held = diagnosis.hold_drift if diagnosis else None
+    if held is not None:
+        return "ambiguous" if len(held.confidence_set) > 1 else "nothing_named"
+    # Errors against a wrong reference, and their floor, mean nothing.
+    doubtful = diagnosis is not None and bool(diagnosis.reference_problems)
+    if not doubtful and is_at_floor(steps[-1].per_rotation, floors, limits):
+        return "noise_floor"
+    added = [step.added for step in steps if step.added is not None]
+    undecided = diagnosis is not None and len(diagnosis.naming.confidence_set) > 1
+    if (added and added[-1].verdict == "ambiguous") or (stopped == "nothing_named" and undecided):
+        return "ambiguous"
+    return stopped

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from glovecal_models.calibration.text import dead_sensor_sentences, wearing_sentences
-from glovecal_models.ceiling.text import ceiling_sentence, not_left_to_gain
-from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.ceiling.text import ceiling_sentence, left_to_gain, not_left_to_gain
+from glovecal_models.comparison.floor_estimate import NoiseFloor, floor_text
 from glovecal_models.comparison.noise_floor import is_at_floor
-from glovecal_models.comparison.text import floor_text
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.hold_text import hold_sentence
+from glovecal_models.diagnosis.hold_text import drift_in_holds, hold_sentence
 from glovecal_models.diagnosis.text import (
     UNITS,
     not_identifiable_sentences,
     nothing_named_sentence,
     ranked_sentence,
     residual_sentence,
+    unexplained,
 )
-from glovecal_models.effects.base.interval_effect import IntervalEffect
-from glovecal_models.improvement.addition import Addition, ClaimCheck, total_rmse_deg
+from glovecal_models.effects.base.effect import IntervalEffect
+from glovecal_models.improvement.addition import Addition, total_rmse_deg
+from glovecal_models.improvement.answer import ClaimCheck, EffectTried, Improved, ImprovementStep
 from glovecal_models.improvement.improvement import Improvement, Trial
 
 MOST_NAMED = 4
@@ -53,18 +55,19 @@ def addition_sentence(addition: Addition) -> str:
 
 
 def _interval_sentence(addition: Addition, claim: ClaimCheck) -> str:
-    name, before, after = _on(addition.effect, addition.rotations), claim.before, claim.after
+    name = _on(addition.effect, addition.rotations)
     if not addition.added:
-        least = claim.limits.claim_least_fall_nats
         return (
             f"{name} was undone: the claimed standard deviation does not become truer (held-out NLPD"
-            f" {before.nlpd:.3f} nats before, {after.nlpd:.3f} after; {least} less is needed)."
+            f" {claim.nlpd_before:.3f} nats before, {claim.nlpd_after:.3f} after;"
+            f" {claim.least_fall_nats} less is needed)."
         )
     short = "" if claim.is_truer else "; the takes are too short to show what a longer session does"
     return (
-        f"{name}: {_what_widens(addition)}. Held-out NLPD {before.nlpd:.2f} nats before, {after.nlpd:.2f}"
-        f" after{short}; the 95 % interval covers {100 * after.coverage_95:.0f} % of the measurements"
-        f" (before: {100 * before.coverage_95:.0f} %); the error stays at"
+        f"{name}: {_what_widens(addition)}. Held-out NLPD {claim.nlpd_before:.2f} nats before,"
+        f" {claim.nlpd_after:.2f} after{short}; the 95 % interval covers"
+        f" {100 * claim.coverage_95_after:.0f} % of the measurements (before:"
+        f" {100 * claim.coverage_95_before:.0f} %); the error stays at"
         f" {total_rmse_deg(addition.before, addition.rotations):.2f} degrees."
     )
 
@@ -161,3 +164,50 @@ def _repeatability_sentences(floors: Mapping[str, NoiseFloor]) -> list[str]:
         f"Repeatability of the reference in degrees: {each}. Frames with nearly the same readings differ"
         " by so much, and no model of these takes can have a smaller error."
     ]
+
+
+# Answers, from results.
+
+
+def effect_tried(found: Addition) -> dict[str, Any]:
+    """The fields of ``EffectTried``, by name."""
+    return {
+        "effect": found.effect,
+        "where": found.rotations,
+        "added": found.added,
+        "sentence": addition_sentence(found),
+        "before": {name: found.before.rmse_deg(name) for name in found.rotations},
+        "after": {name: found.after.rmse_deg(name) for name in found.rotations},
+        "parameters": found.parameters,
+        "curves": found.curves,
+        "claim": found.claim,
+        "declaration": found.declaration,
+    }
+
+
+def improved(found: Improvement) -> Improved:
+    """Before its models are stored."""
+    last, floors = found.diagnosis, found.noise_floor
+    held = None if last is None else last.hold_drift
+    return Improved(
+        steps=[
+            ImprovementStep(
+                None, step.added, step.rmse_deg, step.per_rotation, step.control_rmse_deg,
+                step.rmse_unseen_wearing_deg,
+            )
+            for step in found.steps
+        ],
+        noise_floor_deg={name: floor.floor_deg for name, floor in floors.items()},
+        stopped=found.stopped,
+        undone=[EffectTried(**effect_tried(item)) for item in found.undone],
+        next_take=found.next_take,
+        sentences=improvement_sentences(found),
+        baselines=found.baselines,
+        noise_floor_interval_deg={name: [floor.low_deg, floor.high_deg] for name, floor in floors.items()},
+        noise_floors=floors,
+        hold_drift=None if held is None else drift_in_holds(held),
+        unexplained_residual=None if last is None else unexplained(last.residual, is_noise(found)),
+        ceiling=None if found.ceiling is None else left_to_gain(found.ceiling),
+        method=found.models[0].method,
+        subject=found.models[0].subject,
+    )  # fmt: skip

@@ -5,19 +5,30 @@ two; what is no longer missed is dropped again. The share of a sensor is what it
 sweep over the range it was moved through: standard and largest deviation, as in Wang & Neff 2013, Table 1.
 Intervals come from weighting pieces of time anew. A sensor that could stand in for another, because both
 always moved together, is listed as its rival: no interval shows that.
+
+Columns of the regression that takes a still sensor's deviation apart, and least squares block by block.
+
+Each neighbour has a curve of its own, a polynomial of u, how far it is from where the take began (in shares
+of its range), and two neighbours may have products ``u1 u2``, ``u1**2 u2`` and ``u1 u2**2``. All of them are
+zero where the take began: a neighbour's curve is what it does when it moves alone. Sums of products are kept
+for each block of time, so that leaving out a block or drawing blocks anew costs one small solution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.independence.coupling_columns import CouplingColumns, curve_columns, product_columns
+from glovecal_models.independence.answer import LEAST_MAX_PCT, LEAST_STD_PCT, AffectingShare
 
-LEAST_STD_PCT, LEAST_MAX_PCT = 5.0, 12.0
-"""The paper's rule: from either on a sensor is cross-coupled."""
+POWERS = (1, 2, 3, 4)
+PRODUCTS = ((1, 1), (2, 1), (1, 2))
+BLOCK_S = 1.0
+"""Neighbouring frames err alike; pieces this long hardly do."""
+FOLDS = 5
+RIDGE = 1e-8
 LEAST_CROSSTALK_PCT = 0.7
 """Smaller crosstalk (standard deviation, per cent of the range) is not looked for: a hand held still moves as
 much."""
@@ -28,22 +39,71 @@ DRAWS = 300
 _SWEEP = np.linspace(0.0, 1.0, 101)
 
 
-@dataclass(frozen=True)
-class AffectingShare:
-    """Per cent of the still sensor's active range; ``_low`` and ``_high`` are 95 % intervals."""
+def curve_columns(share: np.ndarray) -> np.ndarray:
+    """Shape (N, len(POWERS)), of one sensor's ``share`` (N,)."""
+    return np.column_stack([share**power for power in POWERS])
 
-    sensor: str
-    std_pct: float
-    std_low: float
-    std_high: float
-    max_pct: float
-    max_low: float
-    max_high: float
-    affects: bool | None
-    """By the rule; None when the interval lies on both sides of it, or a rival could be the cause."""
-    moved_pct: float
-    """How much of its own active range it was moved through."""
-    rivals: tuple[str, ...]
+
+def product_columns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Shape (N, len(PRODUCTS)), of two sensors' shares, each (N,)."""
+    return np.column_stack([first**a * second**b for a, b in PRODUCTS])
+
+
+class CouplingColumns:
+    """Columns by name; the sums of products of each block, shape (B, P, P)."""
+
+    def __init__(
+        self,
+        target: np.ndarray,
+        moved: dict[str, np.ndarray],
+        constants: np.ndarray,
+        block: np.ndarray,
+        pairs: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        """``target`` (N,), each of ``moved`` (N,), ``constants`` (N, C) in every fit, ``block`` (N,)."""
+        columns = [constants]
+        self.groups: dict[str | tuple[str, str], list[int]] = {}
+        place = constants.shape[1]
+        for name, share in moved.items():
+            columns.append(curve_columns(share))
+            self.groups[name] = list(range(place, place + len(POWERS)))
+            place += len(POWERS)
+        for first, second in pairs:
+            columns.append(product_columns(moved[first], moved[second]))
+            self.groups[first, second] = list(range(place, place + len(PRODUCTS)))
+            place += len(PRODUCTS)
+        self.always = list(range(constants.shape[1]))
+        whole = np.column_stack([*columns, target])
+        _, number = np.unique(block, return_inverse=True)
+        self.rows = np.bincount(number)
+        starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
+        self.sums = np.stack(
+            [piece.T @ piece for piece in np.split(whole, starts[1:])]
+        )  # blocks lie one after another
+
+    def places(self, chosen: Sequence[str | tuple[str, str]]) -> list[int]:
+        return [*self.always, *(place for name in chosen for place in self.groups[name])]
+
+    def solve(self, chosen: Sequence[str | tuple[str, str]], weight: np.ndarray) -> np.ndarray:
+        """Coefficients (of ``places``), each block counted ``weight`` (B,) times."""
+        return _solve(np.tensordot(weight, self.sums, 1), self.places(chosen))
+
+    def held_out_rms(self, chosen: Sequence[str | tuple[str, str]]) -> float:
+        """RMS error on held-out blocks, every fifth at a time."""
+        places, total, squared = self.places(chosen), self.sums.sum(axis=0), 0.0
+        for fold in range(FOLDS):
+            held_out = self.sums[fold::FOLDS].sum(axis=0)
+            b = _solve(total - held_out, places)
+            inner = held_out[np.ix_(places, places)]
+            squared += float(held_out[-1, -1] - 2 * b @ held_out[places, -1] + b @ inner @ b)
+        return float(np.sqrt(max(squared, 0.0) / self.rows.sum()))
+
+
+def _solve(sums: np.ndarray, places: list[int]) -> np.ndarray:
+    gram = sums[np.ix_(places, places)]
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-12))
+    scaled = gram / np.outer(scale, scale) + RIDGE * np.eye(len(places))
+    return np.linalg.solve(scaled, sums[places, -1] / scale) / scale
 
 
 @dataclass(frozen=True)
@@ -209,7 +269,8 @@ def _share(
     largest = np.abs(curves - curves.mean(axis=1, keepdims=True)).max(axis=1)
     (std_low, std_high), (max_low, max_high) = (np.percentile(v[1:], [2.5, 97.5]) for v in (std, largest))
     coupled = float(np.mean((std[1:] >= LEAST_STD_PCT) | (largest[1:] >= LEAST_MAX_PCT)))
-    affects = None if 0.025 < coupled < 0.975 or (rivals and coupled > 0.5) else coupled > 0.5
+    is_undecided = 0.025 < coupled < 0.975 or (rivals and coupled > 0.5)
+    affects = "undecided" if is_undecided else "yes" if coupled > 0.5 else "no"
     return AffectingShare(
         name, float(std[0]), float(std_low), float(std_high), float(largest[0]), float(max_low),
         float(max_high), affects, 100 * (high - low), rivals,

@@ -3,6 +3,8 @@
 The shift of the wearing gets a Gaussian posterior (wearing_shift.py) from poses whose angles are known:
 measured (``r.`` columns), or by the pose's name. The child model has the wearing's shift and what is still
 uncertain of it.
+
+The shift that a quick check found, and the error to expect with it, beside a full calibration.
 """
 
 from __future__ import annotations
@@ -15,23 +17,35 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.samples import require_layout
-from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity, sensor_sensitivity
-from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, joined_curves
+from glovecal_models.calibration.samples import SensorSensitivity, require_layout, sensor_sensitivity
 from glovecal_models.effects.base.wearing_effect import (
+    CURVES,
+    WearingCurves,
     curve_weights,
+    joined_curves,
     learned_spread,
     trained_wearings,
     with_checked_wearing,
 )
 from glovecal_models.effects.catalogue import wearing_effect
 from glovecal_models.errors import BadInput
-from glovecal_models.quick_check.checked_poses import CheckedPose, RefusedPose, checked_poses
-from glovecal_models.quick_check.held_poses import HeldPose, held_poses
-from glovecal_models.quick_check.pose_book import PoseBook, usual_poses
-from glovecal_models.quick_check.pose_errors import pose_errors
-from glovecal_models.quick_check.shift_report import ShiftReport, shift_report
-from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift, scaled_to_poses
+from glovecal_models.quick_check.answer import (
+    UNINFORMED,
+    CheckedWearing,
+    ExpectedError,
+    RefusedPose,
+    RotationShift,
+    SensorShift,
+)
+from glovecal_models.quick_check.held_poses import (
+    HeldPose,
+    PoseBook,
+    checked_poses,
+    held_poses,
+    pose_errors,
+    usual_poses,
+)
+from glovecal_models.quick_check.wearing_shift import WearingShift, prior_shift, scaled_to_poses, sensor_shift
 from glovecal_models.takes.take import Take
 
 _SEEN = "wearing {!r} was in the model's training: its takes are more informative than a quick check"
@@ -41,16 +55,11 @@ _SEEN = "wearing {!r} was in the model's training: its takes are more informativ
 class QuickCheck:
     """What was learned from the poses of one wearing, and the model with it."""
 
-    wearing: str
     rotations: tuple[str, ...]
     """The L trained rotations."""
     prior: WearingShift
     shift: WearingShift
-    poses: tuple[CheckedPose, ...]
-    refused: tuple[RefusedPose, ...]
-    report: ShiftReport
-    mixed_wearings: int
-    """On how many wearings the model was trained without an effect that separates them; 0: it has one."""
+    report: CheckedWearing
     model: CalibrationModel
     """The child."""
 
@@ -95,16 +104,89 @@ def quick_check(
     learned = _learned_sd(before, sensitivity)
     prior = prior_shift(sensitivity, learned)
     observed = pose_errors(before, effect.settings, found, sensitivity, known)
-    used, contradicted = checked_poses(observed, prior, sensitivity.rotations, known)
+    used, witnesses, contradicted = checked_poses(observed, prior, sensitivity.rotations, known)
     if learned is None:
-        prior = scaled_to_poses(prior, [item.witness for item in used])
-    shift = prior.after(item.witness for item in used)
-    refused = (*(RefusedPose(item.label, item.reason) for item in missed), *contradicted)
-    report = shift_report(before, sensitivity, prior, shift, used)
+        prior = scaled_to_poses(prior, witnesses)
+    shift = prior.after(witnesses)
+    rotations = _rotation_shifts(before, sensitivity, prior, shift)
+    left = [item.held_out_deg for item in used if item.held_out_deg is not None]
+    noise = np.concatenate([item.variance[item.known] for item in witnesses])
     count = len(set(trained_wearings))
-    mixed = count if count > 1 and not any(item.name == _effect_name() for item in model.effects) else 0
+    is_mixed = count > 1 and not any(item.name == _effect_name() for item in model.effects)
+    report = CheckedWearing(
+        wearing=wearing,
+        poses=used,
+        refused=[*(RefusedPose(item.label, item.reason) for item in missed), *contradicted],
+        rotations=rotations,
+        sensors=_sensor_shifts(sensitivity, prior, shift),
+        poses_before_deg=_rms([item.before_deg for item in used]),
+        poses_held_out_deg=_rms(left) if left else None,
+        pose_noise_deg=float(np.sqrt(noise.mean())),
+        expected=ExpectedError.of(rotations),
+        mixed_wearings=count if is_mixed else 0,
+        separated_by=_effect_name(),
+    )
     child = _child(before, effect, wearing, prior, shift, parent_id, takes)
-    return QuickCheck(wearing, sensitivity.rotations, prior, shift, used, refused, report, mixed, child)
+    return QuickCheck(sensitivity.rotations, prior, shift, report, child)
+
+
+def _rotation_shifts(
+    model: CalibrationModel, sensitivity: SensorSensitivity, prior: WearingShift, shift: WearingShift
+) -> list[RotationShift]:
+    """``shift`` is what poses made of ``prior``."""
+    by_name = {item.rotation: item for item in model.rotations}
+    sd, prior_sd = np.sqrt(np.diag(shift.covariance)), np.sqrt(np.diag(prior.covariance))
+    lanes = prior.lanes
+    found = []
+    for lane, name in enumerate(sensitivity.rotations):
+        item = by_name[name]
+        full = item.held_out_rmse_deg or float(np.sqrt(item.regressor.noise_variance))
+        now, after = prior.usual_variance[lane], shift.usual_variance[lane]
+        found.append(
+            RotationShift(
+                rotation=name,
+                offset_deg=float(shift.mean[lane]),
+                offset_sd_deg=float(sd[lane]),
+                gain_deg_per_sd=float(shift.mean[lanes + lane]),
+                gain_sd_deg_per_sd=float(sd[lanes + lane]),
+                prior_sd_deg=float(prior_sd[lane]),
+                expected_now_deg=float(np.sqrt(full**2 + now)),
+                expected_after_deg=float(np.sqrt(full**2 + after)),
+                full_calibration_deg=float(full),
+                is_informed=bool(after < UNINFORMED * now),
+            )
+        )
+    return found
+
+
+def _sensor_shifts(
+    sensitivity: SensorSensitivity, prior: WearingShift, shift: WearingShift
+) -> list[SensorShift]:
+    """Of the sensors that a rotation moves with."""
+    mean, sd = sensor_shift(sensitivity, prior, shift)
+    _, prior_sd = sensor_shift(sensitivity, prior, prior)
+    found = []
+    for column, name in enumerate(sensitivity.sensors):
+        rotation = sensitivity.measuring(name)
+        if rotation is None:
+            continue
+        slope = float(sensitivity.slope[sensitivity.rotations.index(rotation), column])
+        found.append(
+            SensorShift(
+                sensor=name,
+                readings=float(mean[column]),
+                sd_readings=float(sd[column]),
+                prior_sd_readings=float(prior_sd[column]),
+                degrees=float(slope * mean[column]),
+                sd_degrees=float(abs(slope) * sd[column]),
+                is_informed=bool(sd[column] ** 2 < UNINFORMED * prior_sd[column] ** 2),
+            )
+        )
+    return found
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def without_check(model: CalibrationModel, wearing: str) -> CalibrationModel:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity
+from glovecal_models.calibration.samples import SensorSensitivity
 
 SHIFT_OF_RANGE = 0.04
 """Default prior, where a model has learned none from its wearings: each sensor shifts by this share of its

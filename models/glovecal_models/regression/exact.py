@@ -4,30 +4,42 @@ The mean's coefficients are solved for at every step (``mean.profile_coefficient
 hyperparameters and the noise are searched with the analytic gradient. For the product's own LMC-GPR the
 low-rank trainer reaches the same optimum much faster; this one serves every other combination, and as
 the reference.
+
+The exact likelihood of any process on merged and weighted samples (``merged_samples``).
+
+A sample that counts c has its likelihood to the power c. With noise variance s^2 that is one observation
+with noise s^2 / c, and a factor that depends on s^2 alone: (c - 1) / 2 log(2 pi s^2) + 1 / 2 log c in the
+negative logarithm, and the scatter of merged samples over 2 s^2. The values therefore stand beside those of
+``fit_lmc_gpr`` for the same samples with the same weight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import LinearArd, SquaredExponentialArd
 from glovecal_models.progress import Cancel, Report
-from glovecal_models.regression.lapack_routines import ger, potrf, potri
-from glovecal_models.regression.mean import LinearMean, Mean, profile_coefficients
+from glovecal_models.regression.factorisation import ger, potrf, potri
+from glovecal_models.regression.linear_regressor import LinearMean, Mean, profile_coefficients
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
-from glovecal_models.regression.process_regressor import ProcessRegressor
 from glovecal_models.regression.profiled_likelihood import LOG_2_PI
-from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.regression.training_samples import (
+    MergedSamples,
+    Standardised,
+    check_samples,
+    standardise,
+)
 
 JITTER = 1e-8
 """Added to the covariance's diagonal, in units of the target's variance; stored with the model."""
 
+SEARCHED = 400
+"""Samples on which several starts are tried; the best goes on with all."""
 LOG_NOISE_BOUNDS = (np.log(1e-6), np.log(10.0))
 """Range of the noise variance, in units of the target's variance."""
 
@@ -102,33 +114,6 @@ def search_bounds(covariance: Covariance, dimensions: int) -> list[tuple[float, 
     return [*covariance.bounds(dimensions), LOG_NOISE_BOUNDS]
 
 
-def search_few(
-    x: np.ndarray,
-    y: np.ndarray,
-    mean: Mean,
-    covariance: Covariance,
-    *,
-    starts: int,
-    generator: np.random.Generator,
-    samples: int = 400,
-    iterations: int = 200,
-    cancelled: Cancel | None = None,
-    on_evaluation: Callable[[int], None] | None = None,
-) -> Optimum:
-    """The best [theta, log noise variance] of several searches on at most ``samples`` random samples."""
-    first = np.concatenate([covariance.initial(x, y), [np.log(0.05)]])
-    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(starts - 1)]
-    chosen = generator.permutation(len(y))[:samples]
-    return minimise(
-        ExactLikelihood(x[chosen], y[chosen], mean, covariance),
-        [first, *others],
-        search_bounds(covariance, x.shape[1]),
-        iterations=iterations,
-        cancelled=cancelled,
-        on_evaluation=on_evaluation,
-    )
-
-
 def fit_exact(
     inputs: np.ndarray,
     target: np.ndarray,
@@ -146,13 +131,14 @@ def fit_exact(
     NLML in standardised units (add N log target_scale_deg for degrees), and what each start reached.
     """
     working = standardise(*check_samples(inputs, target))
-    search = search_few(
-        working.x,
-        working.y,
-        mean,
-        covariance,
-        starts=starts,
-        generator=np.random.default_rng(0),
+    generator, bounds = np.random.default_rng(0), search_bounds(covariance, working.x.shape[1])
+    first = np.append(covariance.initial(working.x, working.y), np.log(0.05))
+    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(starts - 1)]
+    chosen = generator.permutation(len(target))[:SEARCHED]
+    search = minimise(
+        ExactLikelihood(working.x[chosen], working.y[chosen], mean, covariance),
+        [first, *others],
+        bounds,
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"searching from {starts} starts", 0.0, 0.2),
     )
@@ -160,7 +146,7 @@ def fit_exact(
     optimum = minimise(
         likelihood,
         [search.parameters],
-        search_bounds(covariance, working.x.shape[1]),
+        bounds,
         cancelled=cancelled,
         on_evaluation=counted_progress(report, f"fitting {len(target)} samples", 0.2, 1.0),
     )
@@ -207,3 +193,74 @@ def _method(mean: Mean, covariance: Covariance) -> str:
     kinds = sorted(part.kind for part in covariance.parts())
     paper = [[SquaredExponentialArd.kind], sorted([LinearArd.kind, SquaredExponentialArd.kind])]
     return "lmc_gpr" if isinstance(mean, LinearMean) and kinds in paper else "gpr"
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """A process at fixed hyperparameters: what prediction is made of. m distinct inputs."""
+
+    coefficients: np.ndarray
+    """Of the mean's basis, (C,)."""
+    residual: np.ndarray
+    """Mean target of each input without the mean, (m,)."""
+    noise: np.ndarray
+    """Noise variance of each input's mean target, jitter included, (m,)."""
+    lower: np.ndarray
+    """Cholesky factor of K + diag(noise), (m, m)."""
+    weights: np.ndarray
+    """(K + diag(noise))^-1 residual, (m,)."""
+
+
+@dataclass(frozen=True)
+class CountedLikelihood:
+    """NLML over [theta, log noise variance], working units."""
+
+    samples: MergedSamples
+    mean: Mean
+    covariance: Covariance
+    jitter: float = JITTER
+
+    def __call__(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
+        """Value and gradient at the best mean coefficients. Raises LinAlgError."""
+        x, counts, noise = self.samples.inputs, self.counts, float(np.exp(parameters[-1]))
+        values, pullback = self.covariance.with_pullback(parameters[:-1], x, x)
+        found = self._posterior(values, noise)
+        log_determinant = 2 * float(np.log(np.diagonal(found.lower)).sum())
+        value = 0.5 * (float(found.residual @ found.weights) + log_determinant + len(x) * LOG_2_PI)
+        value += 0.5 * float(((counts - 1) * (LOG_2_PI + np.log(noise)) + np.log(counts)).sum())
+        value += 0.5 * self.samples.scatter / noise
+        weights = 0.5 * (_inverse(found.lower) - np.outer(found.weights, found.weights))
+        by_noise = noise * float(np.diagonal(weights) @ (1 / counts))
+        by_noise += 0.5 * float((counts - 1).sum()) - 0.5 * self.samples.scatter / noise
+        return value, np.append(pullback(weights)[0], by_noise)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """What the samples at each distinct input count, (m,)."""
+        return self.samples.root_count**2
+
+    def posterior(self, parameters: np.ndarray) -> Posterior:
+        """Raises LinAlgError."""
+        x = self.samples.inputs
+        return self._posterior(self.covariance(parameters[:-1], x, x), float(np.exp(parameters[-1])))
+
+    def _posterior(self, values: np.ndarray, noise: float) -> Posterior:
+        diagonal = noise / self.counts + self.jitter
+        lower, failed = potrf(values + np.diag(diagonal), lower=1, clean=1)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance matrix is not positive definite")
+        target = self.samples.columns[:, -1] / self.samples.root_count
+        basis = self.mean.basis(self.samples.inputs)
+        white = solve_triangular(lower, np.column_stack([basis, target]), lower=True, check_finite=False)
+        coefficients = profile_coefficients(white[:, :-1], white[:, -1])
+        residual = target - basis @ coefficients
+        weights = cho_solve((lower, True), residual, check_finite=False)
+        return Posterior(coefficients, residual, diagonal, lower, weights)
+
+
+def _inverse(lower: np.ndarray) -> np.ndarray:
+    half, failed = potri(lower, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("the covariance matrix is not positive definite")
+    half = np.tril(half)
+    return half + np.tril(half, -1).T

@@ -22,8 +22,8 @@ import numpy as np
 
 from glovecal_models.covariance.base import Covariance
 from glovecal_models.regression.exact import ExactLikelihood
-from glovecal_models.regression.lapack_routines import ger, potrf, potri, syrk, trsm
-from glovecal_models.regression.mean import Mean, profile_coefficients_from_products
+from glovecal_models.regression.factorisation import ger, potrf, potri, syrk, trsm
+from glovecal_models.regression.linear_regressor import Mean, profile_coefficients_from_products
 from glovecal_models.regression.profiled_likelihood import LOG_2_PI
 
 JITTER = 1e-6

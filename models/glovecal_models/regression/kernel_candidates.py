@@ -11,88 +11,42 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.polynomial import Polynomial
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import Polynomial, SquaredExponentialArd
 from glovecal_models.errors import NotTrainable
 from glovecal_models.progress import Cancel
-from glovecal_models.regression.counted_likelihood import CountedLikelihood
-from glovecal_models.regression.exact import JITTER, search_bounds
+from glovecal_models.regression.exact import JITTER, CountedLikelihood, search_bounds
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.mean import LinearMean, Mean, ZeroMean
-from glovecal_models.regression.merged_samples import MergedSamples
+from glovecal_models.regression.linear_regressor import LinearMean, Mean, ZeroMean
 from glovecal_models.regression.optimise import Optimum, minimise
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.regression.served_nodes import few_nodes
-from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
+from glovecal_models.regression.training_samples import (
+    MergedSamples,
+    Standardised,
+    check_samples,
+    standardise,
+)
 
 MEAN_ERROR_DEG, SD_ERROR_DEG = 1e-3, 2e-3
 """How closely served nodes follow the exact process at the training inputs."""
-SEARCHED = 250
+STARTS = 3
+SEARCHED_SAMPLES = 250
 """Samples on which several starts are tried; the best goes on with all."""
 FIRST_LOG_NOISE = float(np.log(0.05))
 
 
-def fit_process(
-    inputs: np.ndarray,
-    target: np.ndarray,
-    mean: Mean,
-    covariance: Covariance,
-    method: str,
-    *,
-    sample_weight: float = 1.0,
-    start: Sequence[float] | np.ndarray | None = None,
-    starts: int = 3,
-    iterations: int = 60,
-    seed: int = 0,
-    cancelled: Cancel | None = None,
-) -> ProcessRegressor:
-    """Train on raw inputs (N, D), counts, and target (N,), degrees; each sample counts ``sample_weight``.
-
-    ``start`` (working units, as ``evidence["parameters"]`` of an earlier fit) replaces the search from
-    several starts. ``evidence``: ``nlml`` in standardised units (+ N log target_scale_deg in degrees),
-    ``parameters`` [theta, log noise variance]. Raises NotTrainable, Cancelled.
-    """
-    working = standardise(*check_samples(inputs, target))
-    samples = MergedSamples.of(working.x, working.y, sample_weight)
-    likelihood = CountedLikelihood(samples, mean, covariance)
-    try:
-        if start is None:
-            start = _searched(working, mean, covariance, sample_weight, starts, seed, cancelled).parameters
-        optimum = minimise(
-            likelihood,
-            [np.asarray(start, float)],
-            search_bounds(covariance, working.x.shape[1]),
-            iterations=iterations,
-            least_gain=1e-3,
-            cancelled=cancelled,
-        )
-    except np.linalg.LinAlgError:
-        raise NotTrainable(
-            f"{covariance!r} has no likelihood on these {len(target)} samples: its covariance matrix "
-            "cannot be factorised"
-        ) from None
-    return _regressor(working, likelihood, optimum, method, sample_weight)
-
-
 def _searched(
-    working: Standardised,
-    mean: Mean,
-    covariance: Covariance,
-    sample_weight: float,
-    starts: int,
-    seed: int,
-    cancelled: Cancel | None,
+    working: Standardised, whole: CountedLikelihood, sample_weight: float, seed: int, cancelled: Cancel | None
 ) -> Optimum:
     """The best of several short searches on some of the samples; each start is fixed by the seed."""
-    generator = np.random.default_rng(seed)
+    mean, covariance, generator = whole.mean, whole.covariance, np.random.default_rng(seed)
     first = np.append(covariance.initial(working.x, working.y), FIRST_LOG_NOISE)
-    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(starts - 1)]
-    chosen = np.sort(generator.permutation(len(working.y))[:SEARCHED])
+    others = [first + generator.normal(scale=1.2, size=len(first)) for _ in range(STARTS - 1)]
+    chosen = np.sort(generator.permutation(len(working.y))[:SEARCHED_SAMPLES])
     weight = min(1.0, sample_weight * len(working.y) / len(chosen))
     samples = MergedSamples.of(working.x[chosen], working.y[chosen], weight)
     return minimise(
@@ -174,20 +128,40 @@ class KernelCandidate:
         target: np.ndarray,
         *,
         sample_weight: float = 1.0,
+        start: Sequence[float] | np.ndarray | None = None,
+        iterations: int = 60,
         seed: int = 0,
         cancelled: Cancel | None = None,
-        **search: Any,
     ) -> ProcessRegressor:
-        """Train on inputs (N, D), counts, and target (N,), degrees; ``search`` goes to ``fit_process``.
+        """Train on raw inputs (N, D), counts, and target (N,), degrees; each sample counts ``sample_weight``.
 
-        Raises NotTrainable, Cancelled.
+        ``start`` (working units, as ``evidence["parameters"]`` of an earlier fit) replaces the search from
+        several starts; LMC-GPR has a search of its own. ``evidence``: ``nlml`` in standardised units (+ N log
+        target_scale_deg in degrees), ``parameters`` [theta, log noise variance]. Raises NotTrainable,
+        Cancelled.
         """
         if self.name == LMC:
             return fit_lmc_gpr(inputs, target, sample_weight=sample_weight, seed=seed, cancelled=cancelled)
-        return fit_process(
-            inputs, target, self.mean, self.covariance, self.method,
-            sample_weight=sample_weight, seed=seed, cancelled=cancelled, **search,
-        )  # fmt: skip
+        working = standardise(*check_samples(inputs, target))
+        samples = MergedSamples.of(working.x, working.y, sample_weight)
+        likelihood = CountedLikelihood(samples, self.mean, self.covariance)
+        try:
+            if start is None:
+                start = _searched(working, likelihood, sample_weight, seed, cancelled).parameters
+            optimum = minimise(
+                likelihood,
+                [np.asarray(start, float)],
+                search_bounds(self.covariance, working.x.shape[1]),
+                iterations=iterations,
+                least_gain=1e-3,
+                cancelled=cancelled,
+            )
+        except np.linalg.LinAlgError:
+            raise NotTrainable(
+                f"{self.covariance!r} has no likelihood on these {len(target)} samples: its covariance"
+                " matrix cannot be factorised"
+            ) from None
+        return _regressor(working, likelihood, optimum, self.method, sample_weight)
 
 
 def _smooth() -> SquaredExponentialArd:

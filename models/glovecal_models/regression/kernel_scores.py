@@ -13,8 +13,7 @@ import numpy as np
 
 from glovecal_models.errors import DamagedArtifact
 from glovecal_models.regression.kernel_candidates import CANDIDATE, CANDIDATES
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.regressor import Regressor, stored_number
+from glovecal_models.regression.regressor import ProcessRegressor, Regressor, stored_number
 
 CLEAR_NATS = 5.0
 """Evidence that leaves little doubt: odds of 150 to 1 (Kass & Raftery 1995: "very strong")."""

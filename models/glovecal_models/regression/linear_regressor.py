@@ -3,10 +3,15 @@
 Without any fit a sensor's range is rescaled onto the joint's active range: what a glove gives before
 calibration (Wang & Neff 2013, section 5.2.2, and the "Raw" column of Table 3). The smallest and largest
 reading become the ends of the range a healthy joint has.
+
+Mean functions of a process: linear in their coefficients, which training therefore solves for.
+
+Lines of which something is known before any fit: the slope along one input, or all of it.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -177,4 +182,104 @@ def rescale_readings(
         variance_root=np.zeros((len(slope) + 1, len(slope) + 1)),
         noise_variance=float(np.mean((mean - target) ** 2)),
         evidence={"trainer": "rescaling", "samples": len(target), "active_range_deg": [start, end]},
+    )
+
+
+class Mean(ABC):
+    """m(x) = basis(x) @ coefficients, a plane or a part of one."""
+
+    @abstractmethod
+    def basis(self, x: np.ndarray) -> np.ndarray:
+        """The columns (N, C) whose combination the mean is, for x (N, D)."""
+
+    @abstractmethod
+    def plane(self, coefficients: np.ndarray, dimensions: int) -> tuple[np.ndarray, float]:
+        """Slope (D,) and intercept of the mean with these coefficients (C,)."""
+
+
+class ZeroMean(Mean):
+    """m_0 of Wang & Neff (2013), Table 2. Training centres the target, so zero is the samples' average."""
+
+    def basis(self, x: np.ndarray) -> np.ndarray:
+        return np.empty((len(x), 0))
+
+    def plane(self, coefficients: np.ndarray, dimensions: int) -> tuple[np.ndarray, float]:
+        return np.zeros(dimensions), 0.0
+
+
+class LinearMean(Mean):
+    """m_l(x) = slope . x + intercept (Wang & Neff 2013, equation 7, with the intercept it leaves out)."""
+
+    def basis(self, x: np.ndarray) -> np.ndarray:
+        return np.column_stack([x, np.ones(len(x))])
+
+    def plane(self, coefficients: np.ndarray, dimensions: int) -> tuple[np.ndarray, float]:
+        return coefficients[:-1].copy(), float(coefficients[-1])
+
+
+def profile_coefficients(whitened_basis: np.ndarray, whitened_target: np.ndarray) -> np.ndarray:
+    """The coefficients of greatest likelihood (generalised least squares), of least norm if many do.
+
+    Both arguments are multiplied by the inverse root of the target's covariance. Solving for the mean at
+    every step instead of searching for it leaves fewer parameters and needs several times fewer steps;
+    by the envelope theorem the other gradients are those at fixed coefficients.
+    """
+    if whitened_basis.shape[1] == 0:
+        return np.empty(0)
+    return _least_squares(whitened_basis, whitened_target, cutoff=1e-10)
+
+
+def profile_coefficients_from_products(products: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The same from the normal equations: basis^T C^-1 basis (C, C) and basis^T C^-1 target (C,)."""
+    return _least_squares(products, right, cutoff=1e-12) if len(right) else np.empty(0)
+
+
+def _least_squares(matrix: np.ndarray, right: np.ndarray, cutoff: float) -> np.ndarray:
+    solution = lstsq(matrix, right, cond=cutoff, check_finite=False)
+    assert solution is not None
+    return solution[0]
+
+
+def line_of(
+    gains: Sequence[float], offset_deg: float, noise_deg: float, evidence: dict[str, Any]
+) -> LinearRegressor:
+    """angle = gains . readings + offset. Gains (D,) in degrees a count; the line itself counts as certain."""
+    count = len(gains)
+    return LinearRegressor(
+        input_shift=np.zeros(count),
+        input_scale=np.ones(count),
+        slope=np.asarray(gains, dtype=float),
+        intercept=float(offset_deg),
+        variance_root=np.zeros((count + 1, count + 1)),
+        noise_variance=float(noise_deg) ** 2,
+        evidence=evidence,
+    )
+
+
+def gains_of(regressor: LinearRegressor) -> tuple[np.ndarray, float]:
+    """Gains (D,) in degrees a count and the offset in degrees at readings of 0."""
+    gains = regressor.slope / regressor.input_scale
+    return gains, float(regressor.intercept - gains @ regressor.input_shift)
+
+
+def fit_beside(
+    inputs: np.ndarray, target: np.ndarray, known_gain: float, *, sensor_names: Sequence[str] | None = None
+) -> LinearRegressor:
+    """Scale and offset of the first of two inputs (N, 2) by least squares; the second turns by ``known_gain``
+    degrees a count. Raises NotTrainable.
+    """
+    beside = inputs[:, 1]
+    names = None if sensor_names is None else sensor_names[:1]
+    own = fit_linear(inputs[:, :1], target - known_gain * beside, sensor_names=names)
+    root = np.zeros((3, 3))
+    root[np.ix_((0, 2), (0, 2))] = own.variance_root
+    shift = float(beside.mean())
+    return LinearRegressor(
+        input_shift=np.append(own.input_shift, shift),
+        input_scale=np.append(own.input_scale, 1.0),
+        slope=np.append(own.slope, known_gain),
+        intercept=own.intercept + known_gain * shift,
+        variance_root=root,
+        noise_variance=own.noise_variance,
+        evidence=own.evidence | {"trainer": "template", "known_gain_deg_per_count": known_gain},
     )

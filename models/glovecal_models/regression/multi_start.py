@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.progress import Cancel
-from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
-from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood
-from glovecal_models.regression.merged_samples import MergedSamples
 from glovecal_models.regression.optimise import SearchResult, newton_search
+from glovecal_models.regression.profiled_likelihood import ExactProfiledLikelihood, LowRankLikelihood
+from glovecal_models.regression.training_samples import MergedSamples
 
 LONGEST_LENGTHSCALE, LARGEST_LOG_RHO, SMALLEST_LOG_RHO, SHORTEST_LENGTHSCALE = 60.0, 12.0, -18.0, 0.02
 SCREENED = 800

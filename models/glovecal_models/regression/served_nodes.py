@@ -18,10 +18,9 @@ import numpy as np
 from scipy.linalg import cho_solve, eigh, solve_triangular
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.regression.counted_likelihood import Posterior
-from glovecal_models.regression.lapack_routines import potrf, potrs, trtrs
-from glovecal_models.regression.low_rank_likelihood import NystromFit
-from glovecal_models.regression.pivoted_cholesky import PivotedCholesky, factor_by_rows
+from glovecal_models.regression.exact import Posterior
+from glovecal_models.regression.factorisation import PivotedCholesky, factor_by_rows, potrf, potrs, trtrs
+from glovecal_models.regression.profiled_likelihood import NystromFit
 
 SIZES = (4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 56, 64, 72, 80, 90, 100, 115, 130, 150, 175, 200)
 SIZES_WHEN_NEEDED = (250, 300, 350, 400, 450, 500, 550, 600, 700)

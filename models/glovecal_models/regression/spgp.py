@@ -14,21 +14,19 @@ import numpy as np
 from scipy.linalg import eigh, solve_triangular
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report
-from glovecal_models.regression.exact import LOG_NOISE_BOUNDS, search_few
+from glovecal_models.regression.exact import LOG_NOISE_BOUNDS
+from glovecal_models.regression.factorisation import factor_by_rows
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.fitc import LEAST_NOISE, FitcLikelihood, Verdict, judge
-from glovecal_models.regression.mean import LinearMean, Mean
+from glovecal_models.regression.linear_regressor import LinearMean
 from glovecal_models.regression.optimise import Optimum, counted_progress, minimise
-from glovecal_models.regression.pivoted_cholesky import factor_by_rows
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.regression.training_samples import Standardised, check_samples, standardise
 
 LEAST_GAIN = 1e-4
 """Nats of an iteration, below which the search ends."""
-_SAMPLES_FOR_START = 300
 _START_SHARE = 0.2
 _REACH = 1.0
 """How far beyond the samples a pseudo-input may move, in input deviations."""
@@ -40,8 +38,6 @@ def fit_spgp(
     *,
     pseudo_inputs: int = 100,
     iterations: int = 200,
-    mean: Mean | None = None,
-    covariance: Covariance | None = None,
     start: ProcessRegressor | None = None,
     sample_weight: float = 1.0,
     seed: int = 0,
@@ -52,39 +48,29 @@ def fit_spgp(
 
     The search takes at most ``iterations`` iterations and ends earlier when one gains less than
     ``LEAST_GAIN``. It starts at the hyperparameters of ``start``, a process trained on the same
-    samples, with pseudo-inputs chosen for these. Without one the start is ``fit_lmc_gpr`` of the same
-    samples, or, where mean or covariance are given, an exact process of at most 300 of them. The noise
-    may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
+    samples, with pseudo-inputs chosen for these; without one at ``fit_lmc_gpr`` of the same samples. The
+    noise may not fall below half the start's, and hyperparameters that the exact likelihood refuses are
     replaced by the start's (``fitc.judge``); ``evidence`` says which happened, its NLML values are in
-    standardised units. The mean is linear and the covariance squared exponential with one relevance per
-    sensor unless given. Each sample counts ``sample_weight``, at most 1, as in ``fit_lmc_gpr``.
-    Raises NotTrainable, Cancelled, and BadInput when ``start`` has another covariance or sensor count.
+    standardised units. The mean is linear, the covariance the start's. Each sample counts ``sample_weight``,
+    at most 1, as in ``fit_lmc_gpr``. Raises NotTrainable, Cancelled, and BadInput when ``start`` has another
+    sensor count.
     """
     inputs, target = check_samples(inputs, target)
     if pseudo_inputs < 1:
         raise BadInput(f"pseudo_inputs is {pseudo_inputs}, expected at least 1")
-    if start is None and mean is None and covariance is None:
+    if start is None:
         first_part = report and (lambda sentence, fraction: report(sentence, _START_SHARE * fraction))
         start = fit_lmc_gpr(
             inputs, target, sample_weight=sample_weight, seed=seed, cancelled=cancelled, report=first_part
         )
-    if start is not None and covariance is not None and covariance.settings() != start.covariance.settings():
-        raise BadInput(f"the start has covariance {start.covariance!r}, not {covariance!r}")
-    if start is not None and len(start.input_shift) != inputs.shape[1]:
+    if len(start.input_shift) != inputs.shape[1]:
         raise BadInput(f"the start has {len(start.input_shift)} sensors, the samples have {inputs.shape[1]}")
-    mean = LinearMean() if mean is None else mean
-    generator = np.random.default_rng(seed)
-    working = standardise(inputs, target)
-    if start is None:
-        covariance = SquaredExponentialArd() if covariance is None else covariance
-        theta, noise = _search_start(working, mean, covariance, generator, cancelled)
-    else:
-        covariance = start.covariance
-        working = _in_units_of(start, working)
-        theta = covariance.scaled(start.theta, working.target_scale**-2)
-        noise = start.noise_variance / working.target_scale**2
+    generator, covariance = np.random.default_rng(seed), start.covariance
+    working = _in_units_of(start, standardise(inputs, target))
+    theta = covariance.scaled(start.theta, working.target_scale**-2)
+    noise = start.noise_variance / working.target_scale**2
     noise = float(np.clip(noise, *np.exp(LOG_NOISE_BOUNDS)))
-    likelihood = FitcLikelihood(working.x, working.y, mean, covariance, sample_weight=sample_weight)
+    likelihood = FitcLikelihood(working.x, working.y, LinearMean(), covariance, sample_weight=sample_weight)
     z = choose_pseudo_inputs(covariance, theta, working.x, pseudo_inputs, generator)
     first = likelihood.pack(theta, noise, z)
     on_evaluation = counted_progress(
@@ -104,28 +90,6 @@ def fit_spgp(
         report(verdict.sentence(), 1.0)
     evidence = _evidence(working, likelihood, first, optimum, verdict)
     return _regressor(working, likelihood, optimum.parameters if verdict.accepted else first, evidence)
-
-
-def _search_start(
-    working: Standardised,
-    mean: Mean,
-    covariance: Covariance,
-    generator: np.random.Generator,
-    cancelled: Cancel | None,
-) -> tuple[np.ndarray, float]:
-    """Theta and noise variance of an exact process of some samples."""
-    search = search_few(
-        working.x,
-        working.y,
-        mean,
-        covariance,
-        starts=3,
-        samples=_SAMPLES_FOR_START,
-        iterations=60,
-        generator=generator,
-        cancelled=cancelled,
-    )
-    return search.parameters[:-1], float(np.exp(search.parameters[-1]))
 
 
 def _in_units_of(start: ProcessRegressor, working: Standardised) -> Standardised:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from glovecal_models.limit import limit
-from glovecal_models.quick_check.held_poses import STILL_SHARE
+from glovecal_models.takes.still_hand import STILL_SHARE
 
 _FIRST = "Not tuned; chosen with the first guided sampling (2026-11-21)."
 

@@ -4,34 +4,204 @@ The sampling of Wang & Neff 2013, section 5.1: key poses held (5.1.1); the sprea
 widget at 0, 10, 20 and 30 degrees while the fingers bend freely (5.1.2; here a comb holds all three gaps at
 once); thumb and wrist through their ranges; then some free motion. About 40 seconds in all.
 The evaluation visits the nine poses of Table 3, each time a little differently.
+
+How a simulated hand moves: between postures, to and fro, and never quite still.
+
+Hands move from posture to posture on smooth bell-shaped speeds (minimum jerk: Flash & Hogan 1985), fingers
+starting a little apart; held, they wander slowly and tremble at 7 to 11 Hz. All motions are functions of
+time, so that any frame can be asked for by itself.
+
+Free motion takes postures as hands take them without being told: Santello, Flanders & Soechting 1998 found
+that two synergies (closing all fingers, and knuckles against middle joints) carry most of the posture of
+grasping hands; spread, thumb opposition and single fingers make the rest. The sizes are typical values.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.names import did_you_mean
-from glovecal_models.simulation.hand_motion import (
-    HandMotion,
-    PostureSequence,
-    Sweep,
-    Unrest,
-    free_motion,
-    posture_vector,
-    within_range,
-)
-from glovecal_models.simulation.simulated_hand import DRIVEN, FINGERS, KEY_POSES, POSTURES, TABLE_3_POSES
+from glovecal_models.simulation.simulated_hand import DRIVEN, KEY_POSES, LONG_FINGERS, POSTURES, TABLE_3_POSES
 
+WANDER_DEG = 0.4
+TREMOR_DEG = 0.12
+"""Amplitudes of each of the two slow and three fast waves of a hand that tries to be still."""
 WIDGET_DEG = (0.0, 10.0, 20.0, 30.0)
 GAPS = ("IM_ABD", "MR_ABD", "RP_ABD")
 CROSS_COUPLE_S, THUMB_S, WRIST_S, FREE_S = 4.0, 6.5, 4.0, 5.0
 HOLD_S, MOVE_S = 1.0, 0.6
 REPEAT_SD_DEG = 2.5
 """How far a person's pose is from the last time it was taken."""
+
+
+class HandMotion(Protocol):
+    """The driven rotations over time."""
+
+    @property
+    def duration_s(self) -> float: ...
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        """Angles, shape (N, len(DRIVEN)), degrees, at ``time_s`` (N,), 0 at the motion's start."""
+        ...
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        """The name of the pose held at each time, "" in between."""
+        ...
+
+
+def minimum_jerk(share: np.ndarray) -> np.ndarray:
+    """Progress 0..1 of a minimum-jerk movement after ``share`` of its time (held at the ends)."""
+    x = np.clip(share, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x * x)
+
+
+def posture_vector(posture: Mapping[str, float]) -> np.ndarray:
+    """Angles in the order of DRIVEN."""
+    return np.array([posture[name] for name in DRIVEN])
+
+
+def within_range(driven: np.ndarray) -> np.ndarray:
+    """Angles held within each joint's active range."""
+    low, high = np.array([ACTIVE_RANGE_DEG[name] for name in DRIVEN]).T
+    return np.clip(driven, low, high)
+
+
+class PostureSequence:
+    """Postures one after another, each held for a while."""
+
+    def __init__(
+        self,
+        postures: np.ndarray,
+        names: Sequence[str],
+        *,
+        hold_s: Sequence[float],
+        move_s: Sequence[float],
+        random: np.random.Generator,
+    ) -> None:
+        """``postures`` (K, len(DRIVEN)); ``hold_s`` has K entries, ``move_s`` K-1."""
+        self._postures = postures
+        self._names = tuple(names)
+        self._arrive = np.concatenate([[0.0], np.cumsum(np.array(hold_s[:-1]) + np.array(move_s))])
+        self._leave = self._arrive + np.array(hold_s)
+        self._move = np.append(np.array(move_s), 1.0)
+        self._late = random.uniform(0.0, 0.2, (len(postures), len(DRIVEN)))
+
+    @property
+    def duration_s(self) -> float:
+        return float(self._leave[-1])
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        at = self._index(time_s)
+        after = np.minimum(at + 1, len(self._postures) - 1)
+        share = ((time_s - self._leave[at]) / self._move[at])[:, None]
+        progress = minimum_jerk((share - self._late[at]) / (1 - self._late[at]))
+        return self._postures[at] + progress * (self._postures[after] - self._postures[at])
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        at = self._index(time_s)
+        held = time_s <= self._leave[at]
+        return tuple(self._names[i] if still else "" for i, still in zip(at, held, strict=True))
+
+    def _index(self, time_s: np.ndarray) -> np.ndarray:
+        return np.clip(np.searchsorted(self._arrive, time_s, side="right") - 1, 0, len(self._arrive) - 1)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """From a start posture into swings of several joints at different speeds, and back."""
+
+    start: np.ndarray
+    """Posture at both ends, shape (len(DRIVEN),), degrees."""
+    low: np.ndarray
+    high: np.ndarray
+    """Each joint swings between these; equal where it is held, for instance by a widget."""
+    speed_hz: np.ndarray
+    phase: np.ndarray
+    duration_s: float
+    blend_s: float = 0.4
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * self.speed_hz * time_s[:, None] + self.phase
+        swing = self.low + (self.high - self.low) * (1 - np.cos(angle)) / 2
+        share = np.minimum(time_s, self.duration_s - time_s) / self.blend_s
+        return self.start + minimum_jerk(share)[:, None] * (swing - self.start)
+
+    def poses(self, time_s: np.ndarray) -> tuple[str, ...]:
+        return ("",) * len(time_s)
+
+
+class Unrest:
+    """Slow wander and tremor of each joint, added to any motion."""
+
+    def __init__(self, random: np.random.Generator, held: Sequence[str] = ()) -> None:
+        """``held`` joints are clamped by a widget and do not move at all."""
+        shape = (5, len(DRIVEN))
+        slow = np.arange(5)[:, None] < 2
+        self._speed_hz = np.where(slow, random.uniform(0.1, 0.5, shape), random.uniform(7.0, 11.0, shape))
+        free = np.array([name not in held for name in DRIVEN])
+        self._size = np.where(slow, WANDER_DEG, TREMOR_DEG) * random.uniform(0.5, 1.5, shape) * free
+        self._phase = random.uniform(0, 2 * np.pi, shape)
+
+    def driven(self, time_s: np.ndarray) -> np.ndarray:
+        """Shape (N, len(DRIVEN)), degrees."""
+        waves = np.sin(2 * np.pi * self._speed_hz * time_s[:, None, None] + self._phase)
+        return (self._size * waves).sum(axis=1)
+
+
+NAMED_SHARE = 0.35
+"""How often a posture lies between two named ones instead of being made of synergies."""
+
+LONGEST_STEP_S = 0.9
+RETURN_S = 0.5
+
+
+def free_motion(duration_s: float, random: np.random.Generator) -> PostureSequence:
+    """Random postures for ``duration_s``, starting and ending at rest."""
+    rest = posture_vector(POSTURES["rest"])
+    postures, hold, move = [rest], [0.1], []
+    while sum(hold) + sum(move) + LONGEST_STEP_S + RETURN_S < duration_s:
+        postures.append(random_posture(random))
+        move.append(random.uniform(0.25, LONGEST_STEP_S - 0.3))
+        hold.append(random.choice([0.0, 0.0, 0.1, 0.3]))
+    postures.append(rest)
+    move.append(RETURN_S)
+    hold.append(max(duration_s - sum(hold) - sum(move), 0.0))
+    return PostureSequence(np.array(postures), [""] * len(postures), hold_s=hold, move_s=move, random=random)
+
+
+def random_posture(random: np.random.Generator) -> np.ndarray:
+    """One posture within the active ranges, shape (len(DRIVEN),), degrees."""
+    if random.random() < NAMED_SHARE:
+        first, second = random.choice(TABLE_3_POSES, 2)
+        mix = random.random()
+        between = mix * posture_vector(POSTURES[first]) + (1 - mix) * posture_vector(POSTURES[second])
+        return within_range(between + 4 * random.standard_normal(len(DRIVEN)))
+    return within_range(posture_vector(_from_synergies(random)))
+
+
+def _from_synergies(random: np.random.Generator) -> dict[str, float]:
+    close, hook, oppose = random.uniform(-0.1, 1), random.uniform(-0.4, 0.4), random.uniform(0, 1)
+    posture = {}
+    for finger in LONG_FINGERS:
+        own = 0.2 * random.standard_normal()
+        posture[f"{finger}_MCP"] = 90 * (close + own - hook)
+        posture[f"{finger}_PIP"] = 100 * (close + own + hook)
+    spread = random.uniform(0, 1) * (1 - 0.7 * max(close, 0))
+    for pair in ("IM_ABD", "MR_ABD", "RP_ABD"):
+        posture[pair] = 30 * spread + 3 * random.standard_normal()
+    posture["T_TMC"] = 60 * oppose + 6 * random.standard_normal()
+    posture["TI_ABD"] = 70 * random.uniform(0, 1) * (1 - 0.4 * close)
+    posture["T_MCP"] = 50 * (0.6 * oppose + 0.4 * random.random())
+    posture["T_IP"] = 80 * (0.5 * close + 0.5 * random.random())
+    posture["W_FLEX"] = 25 - 50 * close + 20 * random.standard_normal()  # a closing hand extends the wrist
+    posture["W_ABD"] = -4 + 10 * random.standard_normal()
+    return posture
 
 
 @dataclass(frozen=True)
@@ -79,8 +249,8 @@ def evaluation_segment(seed: int) -> Segment:
 def cross_couple_segment(seed: int, widget_deg: float) -> Segment:
     """All gaps between fingers held at ``widget_deg``, the fingers bending freely and each by itself."""
     random = np.random.default_rng([seed, 11, round(widget_deg)])
-    swings = {f"{finger}_MCP": (-5.0, 90.0) for finger in FINGERS}
-    swings |= {f"{finger}_PIP": (0.0, 100.0) for finger in FINGERS}
+    swings = {f"{finger}_MCP": (-5.0, 90.0) for finger in LONG_FINGERS}
+    swings |= {f"{finger}_PIP": (0.0, 100.0) for finger in LONG_FINGERS}
     swings |= dict.fromkeys(GAPS, (widget_deg, widget_deg))
     return Segment(
         f"cross_couple_{widget_deg:.0f}",

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.simulation.hand_motion import random_posture
-from glovecal_models.simulation.scene import Scene
-from glovecal_models.simulation.session_motion import joints
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
+from glovecal_models.simulation.protocol import random_posture
+from glovecal_models.simulation.scene import Scene, joints
 from glovecal_models.simulation.session_plan import SessionPlan
 from glovecal_models.simulation.signals import lasting_noise
 from glovecal_models.simulation.simulated_glove import Cloth

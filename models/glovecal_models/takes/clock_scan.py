@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from glovecal_models.takes.answer import ClockVerdict
 from glovecal_models.takes.take import Take
 
 RANGE_S = 3.0
@@ -34,15 +34,13 @@ LOOKS_LIKE_LAG_S = -0.15
 """Readings this much late may as well come from a lag in the sensors."""
 SHORTEST_SCANNED_S = 2.0
 
-Verdict = Literal["offset", "agrees", "not identifiable", "range too small"]
-
 
 @dataclass(frozen=True)
 class ClockOffset:
     """The clocks of one take."""
 
     take: str
-    verdict: Verdict
+    verdict: ClockVerdict
     offset_s: float
     """Reference time = frame time + offset, seconds; 0 unless the verdict is "offset"."""
     low_s: float
@@ -251,7 +249,7 @@ def _best_for_map(
 
 
 def _mean_square(values: np.ndarray) -> float:
-    """Of those that are known, as ``np.nanmean`` has it, which takes longer than what it adds up."""
+    """Mean of the finite values; faster than ``np.nanmean`` on short arrays."""
     if np.isfinite(values).all():
         return float(np.mean(values**2))
     return float(np.nanmean(values**2))
@@ -266,7 +264,7 @@ def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: fl
     least = float(np.nanmin(_scan(grid, grid.readings[::-1])))
     near = _COARSE[scan <= 2.0 * after]
     low, high = (float(near.min()), float(near.max())) if len(near) else (offset_s, offset_s)
-    verdict: Verdict = "offset"
+    verdict: ClockVerdict = "offset"
     if after > BETTER_THAN_REVERSED * least:
         verdict = "not identifiable"
     elif abs(offset_s) >= RANGE_S - COARSE_S:
@@ -279,7 +277,7 @@ def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: fl
     )  # fmt: skip
 
 
-def _sentence(take: str, verdict: Verdict, offset_s: float, before: float, after: float) -> str:
+def _sentence(take: str, verdict: ClockVerdict, offset_s: float, before: float, after: float) -> str:
     if verdict == "not identifiable":
         return f"Take {take}: the clocks cannot be judged; sensors played backwards fit nearly as well."
     if verdict == "range too small":

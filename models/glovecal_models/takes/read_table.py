@@ -43,7 +43,7 @@ _FOREIGN_STARTS = {
 
 def read_csv_table(path: Path) -> RawTable:
     """The whole table, every cell checked. Raises BadTakeTable with file, line, column and value."""
-    _refuse_foreign_start(path)
+    refuse_foreign_start(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             return _read(csv.reader(stream, strict=True, skipinitialspace=True), path.name)
@@ -67,9 +67,9 @@ def _read(reader, file: str) -> RawTable:  # csv.reader's type has no public nam
             _require_full_rows(cells, at, columns, file)
             for column, values in zip(columns, zip(*cells, strict=True), strict=True):
                 if column.is_text:
-                    texts[column.header].extend(_checked_texts(column, values, at, file))
+                    texts[column.header].extend(checked_texts(column, values, at, file))
                 else:
-                    numbers[column.header].append(_parse_numbers(column, values, at, file))
+                    numbers[column.header].append(parse_numbers(column, values, at, file))
         except BadTakeTable as error:
             stray = _stray_line(cells[at.index(error.line)], columns) if error.line in at else None
             if stray is None:
@@ -115,12 +115,12 @@ def _stray_line(cells: Sequence[str], columns: Sequence[Column]) -> str | None:
     written = [
         cell for cell, column in zip(cells, columns, strict=True) if cell.strip() and not column.is_text
     ]
-    if not any(map(_begins_a_number, written)):
+    if not any(map(begins_a_number, written)):
         return f"no number stands here ({', '.join(cells)[:60]}): units, or nothing at all"
     return None
 
 
-def _begins_a_number(cell: str) -> bool:
+def begins_a_number(cell: str) -> bool:
     return _is_number(cell) or cell.lstrip(" +-.,'\xa0")[:1].isdigit()
 
 
@@ -169,7 +169,10 @@ def _require_full_rows(
             )
 
 
-def _parse_numbers(column: Column, cells: Sequence[str], lines: Sequence[int], file: str) -> np.ndarray:
+def parse_numbers(
+    column: Column, cells: Sequence[str], lines: Sequence[int], file: str, scale: float = 1.0
+) -> np.ndarray:
+    """The numbers of a column's cells times ``scale``. Raises BadTakeTable."""
     filled = [cell or "nan" for cell in cells] if column.may_be_empty and "" in cells else cells
     together = "".join(cells)
     plain = together.isascii() and "_" not in together  # float() also reads 1_000 and other scripts' digits
@@ -180,6 +183,7 @@ def _parse_numbers(column: Column, cells: Sequence[str], lines: Sequence[int], f
     except ValueError:
         index = next(i for i, cell in enumerate(filled) if not _is_number(cell))
         raise _bad_cell(column, cells[index], lines[index], file) from None
+    values = values * scale
     unusable = unusable_number(column, values)
     if unusable is not None:
         raise _bad_cell(column, cells[unusable], lines[unusable], file)
@@ -213,7 +217,7 @@ def _comma_hint(cell: str) -> str:
     return " (write a decimal point, not a comma)" if _is_number(cell.replace(",", ".", 1)) else ""
 
 
-def _checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], file: str) -> Sequence[str]:
+def checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], file: str) -> Sequence[str]:
     unusable = unusable_text(column, texts)
     if unusable is not None:
         index, problem = unusable
@@ -221,7 +225,7 @@ def _checked_texts(column: Column, texts: Sequence[str], lines: Sequence[int], f
     return texts
 
 
-def _refuse_foreign_start(path: Path) -> None:
+def refuse_foreign_start(path: Path) -> None:
     with path.open("rb") as stream:
         start = stream.read(4)
     for mark, what in _FOREIGN_STARTS.items():

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.still_hand import stillest
 from glovecal_models.takes.take import Take
 
 SHAPES = {
@@ -26,8 +27,6 @@ SHAPES = {
 """The five shapes of the calibration take (section 3.3.4), each with what to say to a person."""
 START, END = "start-", "end-"
 """Takes of a sequence are named by its place and the shape: ``start-fist``."""
-HELD_S = 1.0
-"""The stillest part of a take, whose median counts."""
 MOST_MOVING = 0.05
 """Spread of readings in that part, as a share of their range in all takes. Of simulated gloves 0.015 to 0.018
 in held shapes, 0.13 to 0.16 in free motion."""
@@ -162,20 +161,6 @@ def held(take: Take) -> np.ndarray:
 def _stillest(take: Take) -> np.ndarray:
     """(N, S): readings of that second."""
     return take.readings[stillest(take)]
-
-
-def stillest(take: Take) -> slice:
-    """Frames of the stillest second of what was asked for."""
-    first = int(np.searchsorted(take.time_s, take.start_s))
-    time_s, readings = take.time_s[first:], take.readings[first:]
-    frames = max(1, int(np.searchsorted(time_s, time_s[0] + HELD_S)))
-    step = max(1, frames // 10)
-    spread = [
-        float(readings[at : at + frames].std(axis=0).sum())
-        for at in range(0, max(1, len(readings) - frames + 1), step)
-    ]
-    at = first + int(np.argmin(spread)) * step
-    return slice(at, at + frames)
 
 
 def shape_of(take: str) -> str | None:

@@ -10,21 +10,34 @@ by itself. ``c.simulated`` other than 0 marks a simulated take.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from glovecal_models.errors import BadTakeTable
-from glovecal_models.takes.frame_times import spread_equal_times, too_few_digits, unit_hint
-from glovecal_models.takes.raw_table import LONGEST_TAKE_S, YEAR_S, ColumnKind, RawTable
+from glovecal_models.takes.answer import ColumnMapping, EqualTimes
+from glovecal_models.takes.column_mapping import mapped_table
+from glovecal_models.takes.raw_table import (
+    LONGEST_TAKE_S,
+    YEAR_S,
+    ColumnKind,
+    RawTable,
+    spread_equal_times,
+    too_few_digits,
+    unit_hint,
+)
 from glovecal_models.takes.read_table import MAGIC, read_csv_table, read_parquet_table
 from glovecal_models.takes.take import Take, deviation_problem, poses_at_frames
 from glovecal_models.takes.write_table import SIMULATED_CONTEXT
 
-EqualTimes = Literal["refuse", "spread"]
 _SUFFIXES = (".csv", ".parquet")
+
+
+WEARING_IN_NAME = re.compile(
+    r"(?:^|[^a-z])((?:wearing|donning|placement|session|day|w)[-_ ]?\d+)(?![0-9a-z])", re.I
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +61,7 @@ def read_takes(
     name: str | None = None,
     wearing: str | None = None,
     equal_times: EqualTimes = "refuse",
+    mapping: ColumnMapping | None = None,
 ) -> list[Take]:
     """All takes of a file, in the order of their first rows. Raises BadTakeTable; nothing is half read.
 
@@ -55,9 +69,12 @@ def read_takes(
     replaces the name of a single take and goes before those of several; without it a take is named by the
     column, else after the file. ``wearing`` says what the file does not; without either it is "".
     Rotations and context that were never measured in a take are left out of it. Frames that were stamped
-    in batches have equal times; ``equal_times="spread"`` spreads each batch up to the next time.
+    in batches have equal times; ``equal_times="spread"`` spreads each batch up to the next time. ``mapping``:
+    how ``frames`` is read, if it is no take table; its name may say the wearing then (``anna-w2-t3.csv``).
     """
-    table = _read_table(frames, equal_times)
+    if mapping is not None and wearing is None and not mapping.of("wearing"):
+        wearing = wearing_of(frames.stem)
+    table = _read_table(frames, equal_times, mapping)
     if not table.names("sensor"):
         raise table.error("no readings: there is no column s.<SENSOR>")
     if reference is None:
@@ -81,6 +98,12 @@ def read_reference(path: Path) -> dict[str | None, ReferenceRows]:
     return {key: _reference_rows(table, rows) for key, rows in _rows_by_take(table).items()}
 
 
+def wearing_of(name: str) -> str | None:
+    """The wearing that a file's name says, such as ``w2`` of ``anna-w2-t3``; None when it says none."""
+    found = WEARING_IN_NAME.search(name)
+    return found[1] if found else None
+
+
 def reference_beside(frames: Path) -> Path | None:
     """For ``X.frames.csv`` the existing file ``X.reference.csv`` (or .parquet) in the same folder."""
     for suffix in _SUFFIXES:
@@ -91,19 +114,25 @@ def reference_beside(frames: Path) -> Path | None:
     return None
 
 
-def _read_table(path: Path, equal_times: EqualTimes = "refuse") -> RawTable:
+def _read_table(
+    path: Path, equal_times: EqualTimes = "refuse", mapping: ColumnMapping | None = None
+) -> RawTable:
     if not path.is_file():
         raise BadTakeTable("there is no such file", file=str(path))
-    with path.open("rb") as stream:
-        is_parquet = stream.read(len(MAGIC)) == MAGIC
-    if path.suffix.lower() == ".parquet" and not is_parquet:
-        raise BadTakeTable("not a Parquet file (it does not begin with PAR1)", file=path.name)
-    table = read_parquet_table(path) if is_parquet else read_csv_table(path)
+    table = _own_table(path) if mapping is None else mapped_table(path, mapping)
     if equal_times == "spread":
         table = _with_spread_times(table)
     _require_increasing_time(table)
     _require_duration(table)
     return table
+
+
+def _own_table(path: Path) -> RawTable:
+    with path.open("rb") as stream:
+        is_parquet = stream.read(len(MAGIC)) == MAGIC
+    if path.suffix.lower() == ".parquet" and not is_parquet:
+        raise BadTakeTable("not a Parquet file (it does not begin with PAR1)", file=path.name)
+    return read_parquet_table(path) if is_parquet else read_csv_table(path)
 
 
 def _with_spread_times(table: RawTable) -> RawTable:
@@ -245,7 +274,7 @@ def _poses(table: RawTable, rows: np.ndarray) -> tuple[str, ...] | None:
 
 def _title(path: Path) -> str:
     name = path.name
-    for suffix in _SUFFIXES:
+    for suffix in (*_SUFFIXES, ".txt", ".tsv", ".dat", ".log"):
         if name.lower().endswith(suffix):
             name = name[: -len(suffix)]
             break

@@ -1,4 +1,7 @@
-"""A take: frames of raw readings, and reference angles and context where they were measured."""
+"""A take: frames of raw readings, and reference angles and context where they were measured.
+
+The measured latency of a glove: how long after the hand its frames are stamped.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +11,34 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_models.presentation.document import answer
 
 LONGEST_INTERPOLATED_GAP_S = 0.1
 """A reference is interpolated between its own samples only when they are closer than this."""
 
 
 @dataclass(frozen=True)
+class KnownLatency:
+    """What ``glovecal take latency`` measured."""
+
+    seconds: float
+    sd_s: float
+    """Standard deviation of ``seconds``."""
+
+
+@answer
 class ReferenceJump:
     """Rows of one rotation's reference that stand apart from those before and after."""
 
     rotation: str
     start_s: float
-    """Of the first of them, on the reference's clock; ``end_s`` of the last."""
+    """Of the first of them, on the reference's clock."""
     end_s: float
     rows: int
     size_deg: float
     """How far away they are, degrees at most; of a step that stays, its height."""
     comes_back: bool
-    """False: a step that stays, at ``start_s``."""
+    """Then its angles are left out of training and of errors; else it is a step that stays, at the start."""
 
 
 @dataclass(frozen=True)

@@ -1,40 +1,118 @@
-"""A take looked at before it is trusted: its rhythm, what each sensor did, what was measured, what is odd."""
+"""A take looked at before it is trusted: its rhythm, what each sensor did, what was measured, what is odd.
+
+Sensors that say nothing of the hand: still, trembling by one count, or pressed against an end stop.
+
+What looks wrong about takes before anything is learned from them; like warnings are counted.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from glovecal_models.takes.dead_sensor import dead_sensors
-from glovecal_models.takes.frame_times import time_unit_warning
-from glovecal_models.takes.reference_check import frames_with_reference, radians_problem, reference_warnings
-from glovecal_models.takes.reference_jumps import jump_sentences, reference_jumps
+from glovecal_models.presentation.document import answer
+from glovecal_models.takes.raw_table import time_unit_warning
+from glovecal_models.takes.reference_jumps import (
+    frames_with_reference,
+    jump_sentences,
+    radians_problem,
+    reference_jumps,
+    reference_warnings,
+)
 from glovecal_models.takes.take import ReferenceJump, Take
 
+FEWEST_FRAMES = 20
+"""With fewer, two values or a repeated end say nothing."""
+MOSTLY = 0.8
+"""Share of the frames at one end of the range from which on a sensor is clipped."""
+MOVES_MEANWHILE = 0.5
+"""Share of its joint's range through which the reference goes while the sensor stays at its end; without a
+reference, share of those frames in which another sensor changes. Less, and the hand rested."""
 GAP_INTERVALS = 2.5
 """An interval longer than this many median ones is a gap: at least one frame in between is missing."""
 MOSTLY_REPEATED = 0.5
 """From this share of repeated frames on, the readings are older than their time stamps say. A hand held
 still repeats 8-bit frames too, so a smaller share says nothing."""
+_NAME = re.compile(r"^Take (['\"]).*?\1")
+_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?(e[-+]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
+class DeadSensor:
+    """``why``: "always 7", "only 7 or 8", or "at its end stop 255 in 93 % of the frames"."""
+
+    sensor: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.sensor} ({self.why})"
+
+
+def dead_sensors(takes: Sequence[Take], sensors: Sequence[str]) -> tuple[DeadSensor, ...]:
+    """Those of ``sensors`` that are dead or clipped over all takes; every take has them all."""
+    columns = {name: np.concatenate([_column(take, name) for take in takes]) for name in sensors}
+    steps = [np.diff(np.unique(values)) for values in columns.values()]
+    count = min((float(step.min()) for step in steps if len(step)), default=0.0)
+    found = ((name, _why(name, values, takes, count)) for name, values in columns.items())
+    return tuple(DeadSensor(name, why) for name, why in found if why is not None)
+
+
+def _why(name: str, values: np.ndarray, takes: Sequence[Take], count: float) -> str | None:
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return f"always {low + 0.0:g}"
+    if len(values) < FEWEST_FRAMES:
+        return None
+    if high - low <= count:
+        return f"only {low + 0.0:g} or {high + 0.0:g}"
+    end = high if np.mean(values == high) > np.mean(values == low) else low
+    share = float(np.mean(values == end))
+    if share < MOSTLY or not _moves_meanwhile(name, takes, end):
+        return None
+    return f"at its end stop {end + 0.0:g} in {100 * share:.0f} % of the frames"
+
+
+def _moves_meanwhile(name: str, takes: Sequence[Take], end: float) -> bool:
+    angles = np.concatenate([take.reference_at_frames([name])[:, 0] for take in takes])
+    at_end = np.concatenate([_column(take, name) == end for take in takes])
+    known = np.isfinite(angles)
+    if (known & at_end).any():
+        return bool(np.ptp(angles[known & at_end]) > MOVES_MEANWHILE * np.ptp(angles[known]))
+    others = np.concatenate([_others_change(take, name) for take in takes])
+    return bool(others[at_end].mean() > MOVES_MEANWHILE)
+
+
+def _others_change(take: Take, name: str) -> np.ndarray:
+    """(N,) whether any other sensor reads something else than in the frame before."""
+    rest = np.delete(take.readings, take.sensors.index(name), axis=1)
+    return np.append(False, (np.diff(rest, axis=0) != 0).any(axis=1))[: len(rest)]
+
+
+def _column(take: Take, name: str) -> np.ndarray:
+    return take.readings[:, take.sensors.index(name)]
+
+
+@answer
 class SensorRange:
-    """What one sensor did; ``changed`` is the share of frames whose reading differs from the one before."""
+    """What one sensor did."""
 
     sensor: str
     low: float
     high: float
     changed: float
+    """Share of frames whose reading differs from the one before."""
 
 
-@dataclass(frozen=True)
+@answer
 class RotationRange:
-    """What was measured of one rotation, degrees; ``rows`` are the reference rows that have it."""
+    """What was measured of one rotation, degrees."""
 
     rotation: str
     rows: int
+    """Reference rows that have it."""
     low_deg: float
     high_deg: float
 
@@ -46,19 +124,21 @@ class TakeCheck:
     rate_hz: float | None
     """Frames a second by the median interval; None for a single frame."""
     gaps: int
+    """Intervals in which frames are missing."""
     longest_interval_s: float | None
     repeated_frames: float
     """Share of frames that are the same as the one before in every sensor."""
     frames_with_reference: float
     """Share of the frames after the pre-roll that have at least one reference angle."""
     pre_roll_frames: int
+    """Recorded before the take was asked for."""
     pre_roll_s: float
-    """Frames, and seconds, recorded before the take was asked for."""
     sensors: tuple[SensorRange, ...]
     rotations: tuple[RotationRange, ...]
     jumps: tuple[ReferenceJump, ...]
     """Where the reference jumps while the sensors do not."""
     sentences: tuple[str, ...]
+    """What looks wrong."""
 
 
 def check_take(take: Take) -> TakeCheck:
@@ -134,3 +214,33 @@ def _frame_warnings(
             "or does the glove measure more slowly than it was recorded?"
         )
     return warnings
+
+
+def take_warnings(takes: Sequence[Take]) -> list[str]:
+    """The sentences of ``check_take``; of those that differ in numbers alone the first, and how many more."""
+    return alike_once([each for take in takes if len(take.time_s) for each in check_take(take).sentences])
+
+
+def excluded_sentences(takes: Sequence[Take]) -> list[str]:
+    """On reference angles that are excluded, as they jump away and come back."""
+    return alike_once([each for take in takes for each in jump_sentences(take, take.excluded)])
+
+
+def alike_once(sentences: Sequence[str]) -> list[str]:
+    """Of those that differ in numbers alone the first, and how many more."""
+    alike: dict[str, list[str]] = {}
+    for sentence in sentences:
+        alike.setdefault(kind_of(sentence), []).append(sentence)
+    return [_summarized(some) for some in alike.values()]
+
+
+def kind_of(sentence: str) -> str:
+    """The same text for warnings that differ in the take's name and in numbers alone."""
+    return _NUMBER.sub("#", _NAME.sub("", sentence)).replace("gaps", "gap").replace("takes", "take")
+
+
+def _summarized(sentences: Sequence[str]) -> str:
+    more = len(sentences) - 1
+    return (
+        sentences[0] if not more else f"{sentences[0]} The same in {more} more take{'s' if more > 1 else ''}."
+    )

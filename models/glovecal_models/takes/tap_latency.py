@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_models.takes.take import KnownLatency
 
 FEWEST_TAPS = 20
 USUAL_KEY_S = (0.005, 0.02)

@@ -17,25 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_client.capture.computer import computer_id
 from glovecal_client.capture.status import CaptureStatus
-from glovecal_client.clock import clock_ns, wall_ns
+from glovecal_client.clock import clock_ns, computer_id, wall_ns
 from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
-from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
-from glovecal_models.colour_glove.pose_estimate import STAGES, PoseEstimate
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.names import did_you_mean
-from glovecal_service.camera.camera_health import HAND, NO_HAND, CameraHealth
-from glovecal_service.camera.camera_light import CameraLight
-from glovecal_service.camera.camera_link import CameraAnswers, CameraLink
+from glovecal_service.camera.camera_link import HAND, NO_HAND, CameraAnswers, CameraHealth, CameraLink
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.drawn_view import SeenPicture, drawn_view
-from glovecal_service.camera.kept_pictures import KeptPictures
-from glovecal_service.camera.newest_picture import NewestPicture, NumberedPicture
-from glovecal_service.camera.picture_reader import PictureReader
-from glovecal_service.camera.tracking_setup import Tracker, TrackingSetup, tracking_setup
+from glovecal_service.camera.picture_reader import KeptPictures, NewestPicture, NumberedPicture, PictureReader
+from glovecal_service.camera.tracking_setup import CameraLight, Tracker, TrackingSetup, tracking_setup
 from glovecal_service.plain import reason_of
 
 TURN_S = 0.1

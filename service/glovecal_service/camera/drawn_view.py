@@ -10,9 +10,9 @@ import numpy as np
 from glovecal_client.errors import BadOption
 from glovecal_client.pictures.source import opencv
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.palette import PRINTED_SRGB
+from glovecal_models.colour_glove.hand_state import PoseEstimate
+from glovecal_models.colour_glove.pattern import PRINTED_SRGB
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
-from glovecal_models.colour_glove.pose_estimate import PoseEstimate
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import posed
 from glovecal_models.errors import BadInput

@@ -6,7 +6,6 @@ is also when the program that started it dies.
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 from typing import TYPE_CHECKING
@@ -14,12 +13,11 @@ from typing import TYPE_CHECKING
 from glovecal_client.capture.command import tell
 from glovecal_client.errors import ClientError, DeviceError
 from glovecal_client.private_files import keep_private
-from glovecal_client.signals import stopped_by_signals
-from glovecal_client.standard_streams import guard_streams, leave_at_once
+from glovecal_client.program import guard_streams, leave_at_once
 from glovecal_models.errors import GlovecalError
-from glovecal_models.threads import pin_blas_to_one_thread
-from glovecal_service.camera.camera_settings import CameraSettings
-from glovecal_service.camera.packages import camera_not_installed
+from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.camera.camera_settings import CameraSettings, camera_not_installed
+from glovecal_service.child_process import stopped_with_the_service
 from glovecal_service.plain import reason_of
 
 if TYPE_CHECKING:
@@ -43,16 +41,8 @@ def run_camera(settings: CameraSettings, stop: threading.Event) -> CameraSummary
 
 def main(text: str) -> int:
     """0, or 1 with a sentence on standard error."""
-    stop = threading.Event()
-
-    def wait_for_the_end() -> None:
-        while os.read(0, 4096):  # not sys.stdin: its lock must be free when the process ends otherwise
-            pass
-        stop.set()
-
-    threading.Thread(target=wait_for_the_end, daemon=True).start()
     try:
-        with stopped_by_signals(stop, outlives_terminal=True):
+        with stopped_with_the_service() as stop:
             tell(str(run_camera(CameraSettings.from_text(text), stop)))
     except (GlovecalError, ClientError, OSError) as error:
         tell(reason_of(error))

@@ -20,11 +20,11 @@ from glovecal_client.pictures.label_file import LabelFilePictures, read_label_ti
 from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_client.pictures.video_file import SUFFIX as VIDEO
 from glovecal_client.pictures.video_file import VideoFilePictures, read_times
+from glovecal_models.colour_glove.hand_state import PoseEstimate, camera_estimates
 from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES
-from glovecal_models.colour_glove.pose_estimate import PoseEstimate, camera_estimates
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
-from glovecal_models.takes.camera_reference.estimates import MOST_FRAMES, CameraEstimates, without_repeats
+from glovecal_models.takes.camera_estimates import MOST_FRAMES, CameraEstimates, without_repeats
 from glovecal_service.camera.tracking_setup import TrackingSetup
 from glovecal_service.plain import reason_of
 

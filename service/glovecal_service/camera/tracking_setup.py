@@ -1,44 +1,111 @@
-"""Everything that cameras' pictures are tracked with: built once, or taken from the data folder."""
+"""Everything that cameras' pictures are tracked with: built once, or taken from the data folder.
+
+Colours are told by a table that is learned on drawings, or on pictures that somebody has labelled. Gains of
+red, green and blue, told from the last pictures of the glove, correct them for the light; a table drawn for a
+hand and its pattern is drawn anew in that light.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import time
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Protocol
 
+import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from glovecal_client.errors import BadOption
 from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.label_file import LabelFilePictures
-from glovecal_client.pictures.rendered import RenderedPictures
-from glovecal_client.pictures.source import PictureSource, build_source
-from glovecal_models.colour_glove.camera_file import read_cameras
-from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.photograph import Photographer, Photography
-from glovecal_models.colour_glove.hand_state import HandState
-from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_client.pictures.source import PictureSource, RenderedPictures, build_source
+from glovecal_models.colour_glove.camera_model import Camera, read_cameras
+from glovecal_models.colour_glove.hand_state import HandState, PoseEstimate
+from glovecal_models.colour_glove.pattern import COLOURS, Pattern, printed_pattern
+from glovecal_models.colour_glove.photograph import Photographer, Photography, labelled_photographs
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
-from glovecal_models.colour_glove.pose.error_learning import PEOPLE, ShapeSpread
+from glovecal_models.colour_glove.pictures.white_balance import CardColours, Gains, blind_gains
+from glovecal_models.colour_glove.pose.error_learning import (
+    PEOPLE,
+    ShapeSpread,
+    drawn_colours,
+    prepared_tracker,
+)
+from glovecal_models.colour_glove.pose.hand_shape_fit import read_shape
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.prepared import prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
-from glovecal_models.colour_glove.pose_estimate import PoseEstimate
 from glovecal_models.colour_glove.pose_set import hand_shapes
 from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.shape_file import read_shape
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.progress import Cancel, Report
 from glovecal_service.camera.camera_settings import TrackingSettings
-from glovecal_service.camera.learned_colours import drawn_table
+
+LABELS = ".labels.png"
+"""What stands in place of a picture's suffix in the name of its label image."""
+
+
+def drawn_table(
+    skin: HandSkin | None = None, pattern: Pattern | None = None, card: CardColours | None = None
+) -> ColourTable:
+    """Learned on drawn photographs of the printed colours in white light; with ``card`` of the colours, and
+    in the light, that its pictures tell."""
+    skin = hand_skin() if skin is None else skin
+    pattern = printed_pattern() if pattern is None else pattern
+    inks, gains = None, (1.0, 1.0, 1.0)
+    if card is not None:
+        inks, gains = card.inks, (1.0 / card.gains.red, 1.0 / card.gains.green, 1.0 / card.gains.blue)
+    photographs = labelled_photographs(skin, pattern, Camera(), inks=inks, gains=gains)
+    return ColourTable.trained([each.picture for each in photographs], [each.labels for each in photographs])
+
+
+def labelled_table(files: Sequence[Path]) -> ColourTable:
+    """From pictures beside each of which lies a label image of its size: ``hand.jpg`` and
+    ``hand.labels.png``, grey levels 0 (no glove) to 10. Raises BadInput for files that are none and for a
+    colour that is missing."""
+    pictures, labels = [picture_file(file) for file in files], []
+    for file, picture in zip(files, pictures, strict=True):
+        beside = file.with_name(file.stem + LABELS)
+        label = _read(beside, cv2.IMREAD_UNCHANGED)
+        if label is None or label.dtype != np.uint8 or label.shape != picture.shape[:2]:
+            raise BadInput(
+                f"{beside} must be a grey picture of {picture.shape[1]} x {picture.shape[0]} pixels, 8 bits, "
+                f"whose levels are the glove's colours: 0 (none) to {COLOURS}"
+            )
+        if label.max() > COLOURS:
+            raise BadInput(f"{beside} has level {label.max()}; colours are 0 (none) to {COLOURS}")
+        labels.append(label)
+    for colour in range(COLOURS + 1):
+        if not any((label == colour).any() for label in labels):
+            raise BadInput(
+                f"colour {colour} is in none of the {len(labels)} label images; show all {COLOURS}"
+            )
+    return ColourTable.trained(pictures, labels)
+
+
+def picture_file(file: Path) -> np.ndarray:
+    """(H, W, 3) uint8 blue, green, red. Raises BadInput for a file that is no picture."""
+    picture = _read(file, cv2.IMREAD_COLOR)
+    if picture is None:
+        raise BadInput(f"{file} cannot be read as a picture")
+    return picture
+
+
+def _read(file: Path, how: int) -> np.ndarray | None:
+    try:
+        content = np.frombuffer(file.read_bytes(), np.uint8)
+    except OSError:
+        return None
+    return cv2.imdecode(content, how) if len(content) else None
+
 
 ASSUMED = Camera()
 LEARNED = 1
@@ -100,7 +167,7 @@ def tracking_setup(
     )
     cameras = _cameras(settings, built)
     first = prepared_tracker(
-        settings.folder, cameras, skin=skin, pattern=hand.pattern, spread=spread,
+        settings.folder, cameras, hand=hand, spread=spread,
         entries=settings.entries, clips=settings.clips, report=report, cancelled=cancelled,
     )  # fmt: skip
     made_from = repr((first.lookup.database.folder.name, cameras, spread, settings.clips))
@@ -245,3 +312,39 @@ class RenderedGlove:
             state = self.state(number / RATE_HZ)
             self._drawn[number] = self._photographer.photograph(state, number=number).picture
         return self._drawn[number]
+
+
+BALANCED_ON, APART_S = 4, 0.3
+"""Pictures from which the light's gains are told, and how far apart they are at least."""
+
+
+class CameraLight:
+    """``gains`` are those of the light as it was told last; ones before."""
+
+    def __init__(self) -> None:
+        self.gains = Gains()
+        self._in_this_light: ColourTable | None = None
+        self._of_glove: deque[np.ndarray] = deque(maxlen=BALANCED_ON)
+        self._of_glove_s = 0.0
+
+    def labels(self, pixels: np.ndarray, setup: TrackingSetup) -> np.ndarray:
+        """Of a picture (H, W, 3); one that is labels already (H, W) comes back as it is."""
+        if pixels.ndim == 2:
+            return pixels
+        now = time.monotonic()
+        if now - self._of_glove_s >= APART_S:
+            self._of_glove_s = now
+            self._of_glove.append(pixels)
+        if self._in_this_light is not None:
+            return self._in_this_light.labels(pixels)
+        return setup.colours.labels(self.gains.corrected(pixels))
+
+    def balance(self, setup: TrackingSetup, *, own_colours: bool) -> dict[str, float]:
+        """Gains from the last pictures, with the mean distance of labels to the hand's before and after,
+        px squared. ``own_colours``: the table is from pictures and cannot be drawn in another light.
+
+        Raises BadInput.
+        """
+        gains, distance, before = blind_gains(list(self._of_glove), setup.colours, setup.first.lookup)
+        self.gains, self._in_this_light = gains, None if own_colours else drawn_colours(setup.hand, gains)
+        return {**asdict(gains), "distance_px2": distance, "distance_before_px2": before}

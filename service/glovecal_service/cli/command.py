@@ -6,6 +6,7 @@ full disk), 2 wrong use of the command, 3 no service reached, 130 interrupted.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -18,11 +19,11 @@ import typer
 import typer.main
 
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
-from glovecal_client.signals import handle_signals
-from glovecal_client.standard_streams import run_command
-from glovecal_service.cli import demo, serve
+from glovecal_client.program import handle_signals, run_command
+from glovecal_service.cli import completion, demo, overview, serve
+from glovecal_service.cli.asking import verb, verb_at_once
 from glovecal_service.cli.camera import cameras
-from glovecal_service.cli.effect import catalogue, changes, detectability, diagnosis, improvement
+from glovecal_service.cli.effect import catalogue, changes, improvement
 from glovecal_service.cli.glove import (
     capture,
     card,
@@ -36,52 +37,65 @@ from glovecal_service.cli.glove import (
     watch,
 )
 from glovecal_service.cli.job import jobs
-from glovecal_service.cli.model import ceiling, comparison, explain, models, quick_check, training, where
+from glovecal_service.cli.model import comparison, models, quick_check, training
 from glovecal_service.cli.sampling import samplings
 from glovecal_service.cli.subject import subjects
 from glovecal_service.cli.take import takes
-from glovecal_service.cli.terminal.printing import err, out
-from glovecal_service.cli.terminal.refusal import EXPECTED, INTERRUPTED, exit_code_of, sentence_of
+from glovecal_service.cli.terminal.printing import EXPECTED, INTERRUPTED, err, exit_code_of, out, sentence_of
+from glovecal_service.questions.catalogue import AT_ONCE, QUESTIONS
+
+HELP = ["-h", "--help"]
+SELDOM = (20_000, 20, 20)
+"""Thresholds of the garbage collector: with Python's own it goes through all that a verb imports again and
+again, for a tenth of the time that the verb takes to start."""
 
 app = typer.Typer(
     name="glovecal",
     help="Joint rotations you can trust, from data gloves.\n\n"
     "With GLOVECAL_URL set it speaks to that service, else it works on the local folder GLOVECAL_DATA "
     "(./glovecal-data).",
-    no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("demo")(demo.demo)
-app.command("serve")(serve.serve)
-app.command("capture", cls=capture.WithDeviceOptions)(capture.capture)
-app.command("find-port")(find_port.find_port)
-app.command("emulate", cls=emulate.WithFaults)(emulate.emulate)
-app.command("card")(card_session.card)
-app.command("read-card")(card.read_card)
-app.command("watch")(watch.watch)
-app.command("doctor")(doctor.doctor)
-app.command("record")(recordings.record)
-app.command("shapes")(shapes.shapes)
-app.add_typer(cameras.app, name="camera")
-app.add_typer(samplings.app, name="sample")
-app.add_typer(subjects.app, name="subject")
-app.add_typer(layouts.app, name="glove")
-app.add_typer(takes.app, name="take")
-app.command("train")(training.train)
-app.add_typer(models.app, name="model")
-app.command("quick-check")(quick_check.quick_check)
-app.command("compare")(comparison.compare)
-app.command("where")(where.where)
-app.command("explain")(explain.explain)
-app.command("ceiling")(ceiling.ceiling)
-app.command("diagnose")(diagnosis.diagnose)
-app.command("detectable")(detectability.detectable)
-app.command("add-effect")(changes.add_effect)
-app.command("remove-effect")(changes.remove_effect)
-app.command("improve", cls=improvement.SeveralFiles)(improvement.improve)
-app.command("effects")(catalogue.effects)
-app.add_typer(jobs.app, name="job")
+START, GLOVES, TAKES, CALIBRATE, EXPLAIN, KEEP = (
+    "Start", "Gloves", "Record and import", "Calibrate", "Compare, find what is missing, add it",
+    "What is kept, and long work",
+)  # fmt: skip
+"""What people do, in the order in which they do it."""
+app.command("demo", rich_help_panel=START)(demo.demo)
+app.command("serve", rich_help_panel=START)(serve.serve)
+app.command("completion", rich_help_panel=START)(completion.completion)
+app.command("capture", cls=capture.WithDeviceOptions, rich_help_panel=GLOVES)(capture.capture)
+app.command("find-port", rich_help_panel=GLOVES)(find_port.find_port)
+app.command("watch", rich_help_panel=GLOVES)(watch.watch)
+app.command("doctor", rich_help_panel=GLOVES)(doctor.doctor)
+app.command("emulate", cls=emulate.WithFaults, rich_help_panel=GLOVES)(emulate.emulate)
+app.command("card", rich_help_panel=GLOVES)(card_session.card)
+app.add_typer(cameras.app, name="camera", rich_help_panel=GLOVES)
+app.add_typer(layouts.app, name="glove", rich_help_panel=GLOVES)
+app.command("record", rich_help_panel=TAKES)(recordings.record)
+app.add_typer(samplings.app, name="sample", rich_help_panel=TAKES)
+app.command("shapes", rich_help_panel=TAKES)(shapes.shapes)
+app.add_typer(takes.app, name="take", rich_help_panel=TAKES)
+app.command("read-card", rich_help_panel=TAKES)(card.read_card)
+app.command("train", rich_help_panel=CALIBRATE)(training.train)
+app.command("quick-check", rich_help_panel=CALIBRATE)(quick_check.quick_check)
+app.command("improve", cls=improvement.SeveralFiles, rich_help_panel=CALIBRATE)(improvement.improve)
+app.command("compare", rich_help_panel=EXPLAIN)(comparison.compare)
+app.command("where", rich_help_panel=EXPLAIN)(comparison.where)
+for question in QUESTIONS.values():
+    if question.verb is not None:
+        app.command(question.verb, rich_help_panel=EXPLAIN)(verb(question))
+for question in AT_ONCE.values():
+    if question.verb is not None:
+        app.command(question.verb, rich_help_panel=EXPLAIN)(verb_at_once(question))
+app.command("add-effect", rich_help_panel=EXPLAIN)(changes.add_effect)
+app.command("remove-effect", rich_help_panel=EXPLAIN)(changes.remove_effect)
+app.command("effects", rich_help_panel=EXPLAIN)(catalogue.effects)
+app.add_typer(models.app, name="model", rich_help_panel=KEEP)
+app.add_typer(subjects.app, name="subject", rich_help_panel=KEEP)
+app.add_typer(jobs.app, name="job", rich_help_panel=KEEP)
 
 
 def _print_version(wanted: bool) -> None:
@@ -92,31 +106,44 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
+    context: typer.Context,
     show_version: Annotated[
         bool,
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand is None:
+        overview.print_overview()
 
 
 @cache
 def command() -> Callable[..., Any]:
     """The verbs of ``app``, which take a fifth of a second to put together."""
-    return typer.main.get_command(app)
+    verbs = typer.main.get_command(app)
+    _name_help(verbs)
+    return verbs
+
+
+def _name_help(verb: Any) -> None:
+    """Of each verb itself: it keeps the names under which its help was asked for first."""
+    verb.context_settings["help_option_names"] = HELP
+    for part in getattr(verb, "commands", {}).values():
+        _name_help(part)
 
 
 def script() -> NoReturn:
     """Entry point of the ``glovecal`` script."""
     _leave_start_folder()
+    gc.set_threshold(*SELDOM)
     handle_signals(_stop, *(number for number in STOP_SIGNALS if number != signal.SIGINT), *HANG_UP)
     run_command(main)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the verb of ``arguments``, the process's own by default; ends in SystemExit where it is refused."""
+    completion.prepare()
     try:
-        command()(arguments, prog_name="glovecal")
+        command()(arguments, prog_name=completion.PROGRAM)
     except KeyboardInterrupt:
         err.print("interrupted")
         sys.exit(INTERRUPTED)

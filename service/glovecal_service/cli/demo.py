@@ -17,13 +17,11 @@ from glovecal_service.cli.terminal.printing import err, out, show
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
-    from glovecal_service.demo.hidden_session import HiddenSession
     from glovecal_service.demo.processes import DemoPlace
     from glovecal_service.demo.second_act import Findings
+    from glovecal_service.first_run.hidden_session import HiddenSession
 
 FIRST_ACT_SEED = 1
-SEEDS = 10_000
-"""Drawn below this: short enough to be typed again."""
 
 
 def demo(
@@ -60,7 +58,8 @@ def demo(
     ] = False,
 ) -> None:
     """Calibrate a simulated CyberGlove live, then find the effect hidden in another; under 90 seconds."""
-    from glovecal_service.demo.hidden_session import check_effect, hidden_session
+    from glovecal_service.first_run.hidden_effect import SEEDS
+    from glovecal_service.first_run.hidden_session import check_effect, hidden_session
 
     if smoke:
         _smoke(FIRST_ACT_SEED if seed is None else seed)
@@ -77,14 +76,12 @@ def demo(
 
 
 def _run(seed: int, effect: str, drawn: int, *, as_json: bool, stay: bool | None) -> None:
-    from glovecal_service.demo.error_fall import hidden_contract
-    from glovecal_service.demo.hidden_session import hidden_session
     from glovecal_service.demo.processes import demo_place, running_service
-    from glovecal_service.demo.second_act import prepare
+    from glovecal_service.demo.second_act import hidden_contract, prepare
     from glovecal_service.demo.staying import stay as stay_there
     from glovecal_service.demo.staying import wants_to_stay
-    from glovecal_service.demo.table import contract, error_table, sentences
-    from glovecal_service.demo.walk import walk
+    from glovecal_service.demo.walk import contract, error_table, sentences, walk
+    from glovecal_service.first_run.hidden_session import hidden_session
 
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
@@ -117,24 +114,22 @@ def _run(seed: int, effect: str, drawn: int, *, as_json: bool, stay: bool | None
 
 def _smoke(seed: int) -> None:
     from glovecal_service.demo.processes import demo_place, running_service
-    from glovecal_service.demo.table import contract
-    from glovecal_service.demo.walk import SMOKE, walk
+    from glovecal_service.demo.walk import SMOKE, rmse_deg, walk
 
     with tempfile.TemporaryDirectory(prefix="glovecal-demo-") as folder:
         place = demo_place(Path(folder))
         with running_service(place) as service:
-            found = contract(walk(service, place, seed, lambda sentence: err.print(sentence), SMOKE))
-    error, frames = found["rmse_deg"], found["frames"]
+            found = walk(service, place, seed, lambda sentence: err.print(sentence), SMOKE)
+    error = rmse_deg(found)
     out.print(
         f"Smoke test of the demo: error {error['raw']:.1f} degrees raw, {error['linear']:.1f} linear; "
-        f"{frames['sent']} frames sent live, {frames['received']} poses received."
+        f"{found.sent} frames sent live, {found.meter.counts.received} poses received."
     )
 
 
 def _second_act(service: RestClient, place: DemoPlace, hidden: HiddenSession, found: Findings) -> None:
-    from glovecal_service.demo.error_fall import chart, fall, verdict
-    from glovecal_service.demo.live_child import live_child, live_sentence
-    from glovecal_service.demo.second_act import second_act
+    from glovecal_service.demo.second_act import chart, fall, second_act, verdict
+    from glovecal_service.demo.staying import live_child, live_sentence
 
     plan = hidden.session.plan
     out.print(

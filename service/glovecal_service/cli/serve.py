@@ -43,9 +43,11 @@ def _smoke() -> None:
 
     from glovecal_service.cli.terminal.printing import out
     from glovecal_service.demo.processes import demo_place, running_service
+    from glovecal_service.plain import read
+    from glovecal_service.rest.glove.answer import Gloves
 
     with tempfile.TemporaryDirectory(prefix="glovecal-serve-") as folder:
         place = demo_place(Path(folder))
         with running_service(place) as service:
-            gloves = len(service.get("/gloves")["seen"])
+            gloves = len(read(Gloves, service.get("/gloves")).seen)
         out.print(f"Smoke test of serve: ready on {place.url} and {place.zenoh}, {gloves} gloves; stopped.")

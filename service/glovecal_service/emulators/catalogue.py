@@ -7,21 +7,20 @@ from dataclasses import dataclass
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
-from glovecal_service.emulators import line_glove
-from glovecal_service.emulators.cyberglove.emulated import EmulatedCyberGlove
+from glovecal_service.emulators import lines
+from glovecal_service.emulators.cyberglove import EmulatedCyberGlove
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.emulators.faults import (
+from glovecal_service.emulators.glove import (
     EVERY_GLOVE,
     WITH_BATTERY,
     WITH_CLOCK,
     WITH_ECHO,
     WITH_FRAGMENTS,
+    EmulatedGlove,
     Faults,
 )
-from glovecal_service.emulators.glove import EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
-from glovecal_service.emulators.homunculus import EmulatedHomunculus
-from glovecal_service.emulators.lucidglove import EmulatedLucidGlove
+from glovecal_service.emulators.lines import EmulatedHomunculus, EmulatedLucidGlove
 from glovecal_service.emulators.opencyberglove import EmulatedOpenCyberGlove
 
 Maker = Callable[[MovingHand, Faults, bool], EmulatedGlove]
@@ -70,11 +69,11 @@ PROTOCOLS: dict[str, Protocol] = {
         lambda hand, faults, _: EmulatedHomunculus(hand, faults), EVERY_GLOVE, "homunculus:{port}"
     ),
     "line": Protocol(
-        lambda hand, faults, _: line_glove.EmulatedLineGlove(hand, faults),
+        lambda hand, faults, _: lines.EmulatedLineGlove(hand, faults),
         _CLOCK | WITH_BATTERY,
         "line:line-glove.toml --option port={port}",
         ("port", "tcp", "udp"),
-        f"line-glove.toml:\n\n{line_glove.DESCRIPTION}",
+        f"line-glove.toml:\n\n{lines.DESCRIPTION}",
     ),
 }
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 import struct
 from collections import deque
 
-from glovecal_service.emulators.cyberglove.box import BITS
-from glovecal_service.emulators.cyberglove.counts import count_of_joint
-from glovecal_service.emulators.faults import Faults
-from glovecal_service.emulators.hand import MovingHand
+from glovecal_service.emulators.cyberglove import BITS
+from glovecal_service.emulators.glove import Faults
+from glovecal_service.emulators.hand import MovingHand, count_of_joint
 
 FRAME_RATE = 30
 CARD_GAP = 28

@@ -1,12 +1,87 @@
-"""What an emulated glove is: bytes in, bytes out, by a clock that is given with every call."""
+"""Faults that can be switched on in an emulated glove, by name.
+
+What an emulated glove is: bytes in, bytes out, by a clock that is given with every call.
+"""
 
 from __future__ import annotations
 
+import random
 from collections import deque
+from collections.abc import Collection, Sequence
 from typing import Protocol
 
-from glovecal_service.emulators.faults import Faults
 from glovecal_service.emulators.hand import MovingHand
+
+EVERY_GLOVE = {
+    "unplug": "the link is gone for 1 s, every 5 s",
+    "stuck-sensor": "the second sensor stays where it was",
+    "noise": "random bytes between 5 % of the records",
+    "short-records": "5 % of the records end early",
+}
+WITH_CLOCK = {
+    "clock-offset": "the glove's clock is 100 s ahead",
+    "clock-drift": "the glove's clock gains 100 ppm",
+}
+WITH_BATTERY = {"battery": "the battery falls from 8.2 to 6.2 V in ten minutes"}
+WITH_ECHO = {"dropped-echo": "every second echo loses its first byte"}
+WITH_FRAGMENTS = {"fragments": "the last two bytes of a time stamp stand alone before 5 % of the records"}
+EXPLAINED = EVERY_GLOVE | WITH_CLOCK | WITH_BATTERY | WITH_ECHO | WITH_FRAGMENTS
+
+OFFSET_S = 100.0
+DRIFT = 100e-6
+UNPLUGGED_S, PERIOD_S = 1.0, 5.0
+_SHARE = 0.05
+_FULL_V, _USUAL_V, _EMPTY_V, _LASTS_S = 8.2, 7.445, 6.2, 600.0
+
+
+class Faults:
+    """The faults of ``names``, and what each does. ``seed`` fixes where the random ones strike."""
+
+    def __init__(self, names: Collection[str] = (), seed: int = 0) -> None:
+        self.names = set(names)
+        self.drift = DRIFT if "clock-drift" in self.names else 0.0
+        """What the glove's clock gains, s per s; another may be put here."""
+        self.offset_s = OFFSET_S if "clock-offset" in self.names else 0.0
+        self._chance = random.Random(seed)
+        self._stuck_at: float | None = None
+
+    def values(self, values: Sequence[int]) -> list[int]:
+        """With ``stuck-sensor`` the second value is what it was at first."""
+        changed = list(values)
+        if "stuck-sensor" in self.names:
+            if self._stuck_at is None:
+                self._stuck_at = changed[1]
+            changed[1] = int(self._stuck_at)
+        return changed
+
+    def record(self, record: bytes) -> bytes:
+        """A record on its way out: cut short, or with noise before it."""
+        if "short-records" in self.names and self._chance.random() < _SHARE:
+            record = record[: self._chance.randrange(1, len(record))]
+        if "fragments" in self.names and self._chance.random() < _SHARE:
+            record = b"1S" + record
+        if "noise" in self.names and self._chance.random() < _SHARE:
+            record = self._chance.randbytes(self._chance.randint(1, 40)) + record
+        return record
+
+    def clock_s(self, time_s: float) -> float:
+        """What the glove's clock says at ``time_s``."""
+        return time_s * (1 + self.drift) + self.offset_s
+
+    def battery_v(self, on_for_s: float) -> float:
+        """Volts after so many seconds of use."""
+        if "battery" not in self.names:
+            return _USUAL_V
+        return max(_EMPTY_V, _FULL_V - (_FULL_V - _EMPTY_V) * on_for_s / _LASTS_S)
+
+    def echo(self, echo: bytes, number: int) -> bytes:
+        """The echo of the ``number``-th command."""
+        return echo[1:] if "dropped-echo" in self.names and number % 2 else echo
+
+    def unplugged(self, on_for_s: float) -> bool:
+        """Whether the link is gone after so many seconds."""
+        return "unplug" in self.names and on_for_s % PERIOD_S > PERIOD_S - UNPLUGGED_S
+
 
 _REMEMBERED = 20000
 

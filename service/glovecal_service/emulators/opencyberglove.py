@@ -7,8 +7,7 @@ import random
 import struct
 import zlib
 
-from glovecal_service.emulators.faults import Faults
-from glovecal_service.emulators.glove import SendingGlove
+from glovecal_service.emulators.glove import Faults, SendingGlove
 from glovecal_service.emulators.hand import MovingHand
 
 RANGE = 16384

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from glovecal_models.errors import BadInput
-from glovecal_service.exports import angle_table, bvh, trc
-from glovecal_service.exports.export_format import ExportFormat
+from glovecal_service.exports.bvh import FORMAT as BVH
+from glovecal_service.exports.hand_motion import ExportFormat
+from glovecal_service.exports.marker_tables import CSV, PARQUET, TRC
 
-FORMATS: dict[str, ExportFormat] = {
-    one.suffix: one for one in (trc.FORMAT, bvh.FORMAT, angle_table.CSV, angle_table.PARQUET)
-}
+FORMATS: dict[str, ExportFormat] = {one.suffix: one for one in (TRC, BVH, CSV, PARQUET)}
 
 
 def format_of(name: str) -> ExportFormat:

@@ -1,9 +1,10 @@
-"""One hand's motion as an export writes it, and two hands on one time."""
+"""One hand's motion as an export writes it, two hands on one time, and what an export format is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -107,3 +108,14 @@ def at_times(motion: HandMotion, at: np.ndarray) -> HandMotion:
         motion, time_s=at, readings=np.where(gap[:, None], np.nan, motion.readings[nearest]),
         degrees=between(motion.degrees), sd_deg=between(motion.sd_deg),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """Known by the end of a file's name."""
+
+    suffix: str
+    """With its dot, lower case."""
+    media_type: str
+    write: Callable[[Sequence[HandMotion], Content, Path], None]
+    """Writes hands on one time to a file. Raises BadInput."""

@@ -14,7 +14,6 @@ from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind
 from glovecal_service.jobs.job_run import JobRun
 from glovecal_service.jobs.owner import Owner
-from glovecal_service.jobs.registry import KINDS
 from glovecal_service.jobs.workers import Workers
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -33,7 +32,7 @@ class Dispatcher:
         self,
         store: Store,
         settings: Settings,
-        kinds: Mapping[str, JobKind] = KINDS,
+        kinds: Mapping[str, JobKind],
         *,
         of_one_command: bool = False,
     ) -> None:

@@ -1,6 +1,6 @@
 """What a kind of job is: a plan of independent tasks, and what to do with their results.
 
-A new kind is one module with a ``JobKind`` and one line in ``registry.py``.
+A new kind is one module with a ``JobKind`` and one line in ``questions/catalogue.py``.
 """
 
 from __future__ import annotations

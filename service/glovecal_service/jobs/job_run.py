@@ -34,6 +34,7 @@ HEARTBEAT_S = 5.0
 STRAGGLERS_S = 1.0
 """After a cancel the row is written this late at most, whether or not the last fit has noticed."""
 WORKER_RESTARTS = 3
+"""In a row: a job that gets on between two losses, as a long one on a busy computer does, may go on."""
 RETRY_WRITES_FOR_S = 60.0
 
 
@@ -155,13 +156,16 @@ class JobRun:
         return self._folder / f"progress-{self._job.id}-{self._job.attempt}-{number}.json"
 
     def _fit_in_workers(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
-        for restart in range(WORKER_RESTARTS + 1):
+        restarts = 0
+        while True:
+            known = len(results)
             try:
                 self._hand_out(plan, results)
                 return
             except WorkersLost as error:
                 self._raise_if_stopped()
-                if restart == WORKER_RESTARTS:
+                restarts = 1 if len(results) > known else restarts + 1
+                if restarts > WORKER_RESTARTS:
                     raise
                 log.warning("training processes lost, starting again", job=self._job.id, reason=str(error))
                 self._workers.reset(error.client)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
-from glovecal_service.store.json_text import json_text
+from glovecal_service.store.texts import json_text
 
 
 def task_key(kind: str, facts: Mapping[str, Any]) -> str:

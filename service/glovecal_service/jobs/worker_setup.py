@@ -6,7 +6,7 @@ from __future__ import annotations
 from distributed import Worker
 
 from glovecal_client.private_files import keep_private
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.jobs.dask_log import silence_dask
 from glovecal_service.operating_system import step_back
 

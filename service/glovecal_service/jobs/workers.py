@@ -58,7 +58,7 @@ _CONFIG = {
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
 _LONGEST_FOLDER = 75
 """Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
-_IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.jobs.registry"]
+_IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.questions.catalogue"]
 """SciPy's signal package brings those for optimisation and statistics, which diagnoses use."""
 
 

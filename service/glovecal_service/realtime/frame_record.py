@@ -12,9 +12,10 @@ from threading import Event
 import numpy as np
 
 from glovecal_client.wire.frame import Frame
+from glovecal_models.calibration.answer import FrameExplanation
 from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.effect_correction import EffectCorrection
-from glovecal_models.calibration.explanation import FrameExplanation, PredictedFrame, explained
+from glovecal_models.calibration.explanation import PredictedFrame, explained
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_service.realtime.served_model import ServedModel
 

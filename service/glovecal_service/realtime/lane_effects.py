@@ -1,9 +1,11 @@
 """The effects of one glove's model: their state from frame to frame, and when it has to start anew.
 
+They have to know which wearing a run is, and what the glove's context values mean.
+
 Time is the capture computer's monotonic clock, the same that a recorded take has. Frames that were skipped or
 lost are not made up: the recursions take the time that really passed, as they do in a take with holes. After
-more than a second without a frame every effect with a memory forgets (it does so itself, in takes too), and
-a new run, a new wearing or another model starts all of them anew.
+more than a second without a frame every effect with a memory forgets (it does so itself, in takes too), and a
+new run, a new wearing or another model starts all of them anew.
 """
 
 from __future__ import annotations
@@ -11,14 +13,80 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from glovecal_client.wire.frame import Frame
 from glovecal_client.wire.pose import PoseFlag
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
+from glovecal_models.takes.take import KnownLatency
 from glovecal_service.plain import reason_of
 from glovecal_service.realtime.served_model import ServedModel
-from glovecal_service.realtime.worn_gloves import WornGlove
+
+
+@dataclass(frozen=True)
+class GloveContext:
+    """What was said about one glove."""
+
+    run_id: str = ""
+    """The run that the wearing is of, 16 hexadecimal digits."""
+    wearing: str = ""
+    """"" when nobody said."""
+    context: tuple[str, ...] = ()
+    """Names of a frame's context values, in order."""
+    latency_ns: int = 0
+    """How long before a frame's time the hand was as it shows; 0 if nobody measured it."""
+    sensors: tuple[str, ...] = ()
+    """Names of a frame's readings, in order; empty while capture has not said them."""
+
+    @classmethod
+    def of(
+        cls, meta: Mapping[str, Any] | None, wearing: str | None, latency: KnownLatency | None = None
+    ) -> GloveContext:
+        """``meta`` as capture said it, ``wearing`` as the store has it (it knows later assignments too)."""
+        meta = meta or {}
+        names = meta.get("context")
+        context = tuple(map(str, names)) if isinstance(names, list) else ()
+        latency_ns = 0 if latency is None else round(1e9 * latency.seconds)
+        said = meta.get("sensors")
+        sensors = tuple(map(str, said)) if isinstance(said, list) else ()
+        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns, sensors)
+
+    def wearing_of(self, frame: Frame) -> str:
+        """A run of which nothing was said yet is a wearing of its own, without a name."""
+        return self.wearing if self.run_id == f"{frame.run_id:016x}" else ""
+
+    def context_of(self, frame: Frame, wanted: tuple[str, ...]) -> dict[str, float]:
+        """Those of the ``wanted`` columns that this frame has a value of.
+
+        Nothing when the frame has another number of values than there are names.
+        """
+        if not wanted or len(frame.context) != len(self.context):
+            return {}
+        values = dict(zip(self.context, frame.context.tolist(), strict=True))
+        return {name: values[name] for name in wanted if not np.isnan(values.get(name, np.nan))}
+
+
+class WornGloves:
+    """Written by the model watcher, read between frames."""
+
+    def __init__(self) -> None:
+        self._gloves: dict[str, GloveContext] = {}
+
+    def of(self, glove: str) -> GloveContext:
+        return self._gloves.get(glove, _UNKNOWN)
+
+    def put(self, glove: str, worn: GloveContext) -> None:
+        self._gloves[glove] = worn
+
+    def forget(self, glove: str) -> None:
+        self._gloves.pop(glove, None)
+
+
+_UNKNOWN = GloveContext()
+
 
 _RESET = int(PoseFlag.STATE_RESET)
 _SETTLING = int(PoseFlag.SETTLING)
@@ -47,7 +115,7 @@ class LaneEffects:
         self._last_s = 0.0
         self._settling = False
 
-    def begin_frame(self, frame: Frame, worn: WornGlove) -> int:
+    def begin_frame(self, frame: Frame, worn: GloveContext) -> int:
         """Look at the next frame, reset what has to start anew with it; the pose's flags about the state."""
         wearing = worn.wearing_of(frame)
         begins = self._begins(frame.run_id, wearing)

@@ -16,12 +16,13 @@ import zenoh
 
 from glovecal_client.errors import BadName
 from glovecal_client.keys import JSON_ENCODING, all_gloves, parse_glove_key
-from glovecal_client.queries import REFUSAL_ENCODING
-from glovecal_models.calibration.explanation import FrameExplanation, chosen_rotations
+from glovecal_client.session import REFUSAL_ENCODING
+from glovecal_models.calibration.answer import FrameExplanation, LiveExplanation
+from glovecal_models.calibration.explanation import chosen_rotations
 from glovecal_models.errors import BadInput
+from glovecal_service.plain import json_of
 from glovecal_service.realtime.frame_record import FrameRecord
-from glovecal_service.realtime.glove_lane import GloveLane
-from glovecal_service.views.explanation import live_explanation_view
+from glovecal_service.realtime.glove_lanes import GlovePipeline
 
 EVERY_S = 0.1
 FRAME_WITHIN_S = 0.3
@@ -35,7 +36,7 @@ _log = logging.getLogger("glovecal.realtime")
 class LiveExplanations:
     """Answers ``glovecal/<site>/<glove>/pose/explain?rotations=I_PIP,T_IP``; without names, all rotations."""
 
-    def __init__(self, session: zenoh.Session, site: str, lanes: Callable[[], list[GloveLane]]) -> None:
+    def __init__(self, session: zenoh.Session, site: str, lanes: Callable[[], list[GlovePipeline]]) -> None:
         self._lanes = lanes
         self._asked = Condition()
         self._queries: dict[str, list[zenoh.Query]] = {}
@@ -113,12 +114,13 @@ def _answer(query: zenoh.Query, glove: str, record: FrameRecord, found: FrameExp
     except BadInput as error:
         _refuse(query, str(error))
         return
-    view = live_explanation_view(
-        found, glove=glove, model=model.model_id, run_id=frame.run_id, sequence=frame.sequence,
-        rotations=rotations,
+    explanation = LiveExplanation(
+        **found.facts(rotations), glove=glove, model=model.model_id, run_id=f"{frame.run_id:016x}",
+        sequence=frame.sequence,
     )  # fmt: skip
+    document = json_of(explanation)
     with query:
-        query.reply(query.key_expr, view.model_dump_json(), encoding=JSON_ENCODING)
+        query.reply(query.key_expr, document, encoding=JSON_ENCODING)
 
 
 def _refuse(query: zenoh.Query, sentence: str) -> None:

@@ -1,25 +1,253 @@
-"""The thread that keeps every glove on the model it should have, without ever holding up a frame."""
+"""The thread that keeps every glove on the model it should have, without ever holding up a frame.
+
+That is its wearer's newest active one that reads the glove's sensors.
+"""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from threading import Event
+from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from glovecal_models.errors import BadInput, GlovecalError
-from glovecal_models.takes.known_latency import KnownLatency
+from glovecal_models.calibration.artifact import load
+from glovecal_models.errors import BadInput, DamagedArtifact, GlovecalError
+from glovecal_models.hand.rotations import Handedness, is_of_hand, known_hand
+from glovecal_models.takes.take import KnownLatency
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.glove_lane import GloveLane
-from glovecal_service.realtime.glove_metas import GloveMetas
-from glovecal_service.realtime.model_choice import choose
-from glovecal_service.realtime.pose_meta import PoseMetas, Serving
-from glovecal_service.realtime.served_model import ServedModels
-from glovecal_service.realtime.worn_gloves import WornGlove, WornGloves
-from glovecal_service.store.errors import StoreDamaged, StoreError, StoreUnavailable
+from glovecal_service.realtime.glove_lanes import GlovePipeline
+from glovecal_service.realtime.lane_effects import GloveContext, WornGloves
+from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas, Serving
+from glovecal_service.realtime.served_model import ServedModel, ServedModels
+from glovecal_service.store.errors import DamagedRows, NotFound, StoreDamaged, StoreError, StoreUnavailable
+from glovecal_service.store.models import other_remedies
+from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
+
+Prepared = Mapping[tuple[str, tuple[str, ...]], ServedModel]
+"""Models in use, by id and by the order in which their gloves send the sensors."""
+MOST_NAMED = 4
+
+
+@dataclass(frozen=True)
+class ActiveModel:
+    """A subject's active model of one layout."""
+
+    record: ModelRecord
+    activation: int
+    """Of two the larger one is newer."""
+    sensors: tuple[str, ...] | None
+    """None: nobody stored the layout."""
+
+
+def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Prepared) -> Serving:
+    """How ``glove`` is to be served now.
+
+    The name of a layout does not matter, nor the order of its sensors: frames are read by the sensors' names.
+    A damaged or missing artifact is named in the sentence with what to do; a model that is in use stays, else
+    the one that was active before it is taken. Raises StoreError when the database does not answer.
+    """
+    try:
+        record = store.gloves.get(glove)
+    except NotFound:
+        return Serving(sentence=f"glove {glove} has not said yet which layout it has")
+    subject, layout = record.subject, record.layout
+    run_id = str((meta or {}).get("run_id") or "")
+    serving = Serving(subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency)
+    if layout is None:
+        return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
+    if subject is None:
+        return replace(
+            serving, sentence=f"nobody wears glove {glove}; say who: glovecal glove wear {glove} SUBJECT"
+        )
+    try:
+        models = store.models.list(subject)
+    except DamagedRows as error:
+        models = error.sound
+    if not models:
+        sentence = f"subject {subject} has no model yet; train one: glovecal train --subject {subject}"
+        return replace(serving, sentence=sentence)
+    sent = _sensors_sent(store, layout, meta)
+    layouts = dict.fromkeys(model.layout for model in models)
+    hand = known_hand((meta or {}).get("hand"))
+    active = [found for name in layouts if (found := _active(store, subject, name, hand)) is not None]
+    fitting = [item for item in active if _fits(item, layout, sent)]
+    if not fitting:
+        why = _other_hands_model(glove, subject, hand, models) or _why_none(
+            store, serving, [each for each in models if is_of_hand(each.hand, hand)], active, sent
+        )
+        return replace(serving, sentence=why)
+    newest = max(fitting, key=lambda item: item.activation)
+    chain = _chain(store, newest.record, [item.id for item in models if is_of_hand(item.hand, hand)])
+    found = _first_that_loads(store, chain, newest.record, serving, sent, prepared)
+    return replace(
+        found,
+        sentence="; ".join(filter(None, [_other_hand(store, newest.record, glove, hand), found.sentence])),
+    )
+
+
+def _other_hand(store: Store, model: ModelRecord, glove: str, said: Handedness | None) -> str:
+    """That the glove is of another hand than the model's wearer, a clause; "" where it is not: a model whose
+    takes say their hand was chosen by it."""
+    try:
+        hand = store.subjects.get(model.subject).known_hand
+    except NotFound:
+        return ""
+    if model.hand is not None or said is None or hand in (None, said):
+        return ""
+    return (
+        f"wrong hand: {glove} is a {said} glove and {model.subject} a {hand} hand; exchange the gloves, or "
+        f"say who wears this one: glovecal glove wear {glove} SUBJECT"
+    )
+
+
+def _other_hands_model(
+    glove: str, subject: str, hand: Handedness | None, models: Sequence[ModelRecord]
+) -> str:
+    """That all models are of the other hand; "" where they are not."""
+    if hand is None or any(is_of_hand(model.hand, hand) for model in models):
+        return ""
+    other = models[-1].hand
+    return (
+        f"wrong hand: {glove} is a {hand} glove and every model of {subject} is of the {other} hand; "
+        f"exchange the gloves, or record and train this hand too: "
+        f"glovecal train --subject {subject} --hand {hand}"
+    )
+
+
+def _sensors_sent(store: Store, layout: str, meta: Mapping[str, Any] | None) -> tuple[str, ...] | None:
+    """Sensors in the order of the glove's frames; None when neither it nor its layout tells."""
+    said = None if meta is None else meta.get("sensors")
+    if isinstance(said, list):
+        return tuple(map(str, said))
+    return _sensors_of(store, layout)
+
+
+def _sensors_of(store: Store, layout: str) -> tuple[str, ...] | None:
+    try:
+        return store.layouts.get(layout).sensors
+    except NotFound:
+        return None
+
+
+def _active(store: Store, subject: str, layout: str, hand: Handedness | None) -> ActiveModel | None:
+    record = store.models.active(subject, layout, hand)
+    if record is None:
+        return None
+    newest = max(item.id for item in store.models.activations(subject, layout) if item.model == record.id)
+    return ActiveModel(record, newest, _sensors_of(store, layout))
+
+
+def _fits(item: ActiveModel, layout: str, sent: tuple[str, ...] | None) -> bool:
+    """By its sensors; where they are not known, by the layout's name."""
+    if sent is None or item.sensors is None:
+        return item.record.layout == layout
+    return not _why_not(item.record.id, item.sensors, sent)
+
+
+def _chain(store: Store, active: ModelRecord, of_the_hand: Sequence[str]) -> list[str]:
+    """Model ids: the active one, then what rolling back would lead to, if it is ``of_the_hand``."""
+    by_id = {item.id: item for item in store.models.activations(active.subject, active.layout)}
+    current, chain = by_id[max(id for id in by_id if by_id[id].model == active.id)], [active.id]
+    while current.previous is not None and current.previous in by_id:
+        current = by_id[current.previous]
+        if current.model not in chain and current.model in of_the_hand:
+            chain.append(current.model)
+    return chain
+
+
+def _why_none(
+    store: Store,
+    serving: Serving,
+    models: Sequence[ModelRecord],
+    active: Sequence[ActiveModel],
+    sent: tuple[str, ...] | None,
+) -> str:
+    """Which models there are, and why none of them can be served."""
+    misfits = {model.id: _why_not(model.id, _sensors_of(store, model.layout), sent) for model in models}
+    usable = [model for model in models if not misfits[model.id] and sent is not None]
+    said = [f"subject {serving.subject} has no active model for this glove (layout {serving.layout})"]
+    if usable:
+        count = "1 model exists" if len(usable) == 1 else f"{len(usable)} models exist"
+        newest = usable[-1].id[:12]
+        said.append(f"{count} that would fit, activate one, such as: glovecal model activate {newest}")
+    reasons = [misfits[item.record.id] for item in active if misfits[item.record.id]]
+    reasons = reasons or ([] if usable else [misfits[model.id] for model in models if misfits[model.id]])
+    said += reasons[:MOST_NAMED]
+    if len(reasons) > MOST_NAMED:
+        said.append(f"and {len(reasons) - MOST_NAMED} more that do not fit")
+    return "; ".join(said)
+
+
+def _first_that_loads(
+    store: Store,
+    chain: list[str],
+    active: ModelRecord,
+    serving: Serving,
+    sent: tuple[str, ...] | None,
+    prepared: Prepared,
+) -> Serving:
+    problems = []
+    for model_id in chain:
+        model = _in_use(prepared, model_id, sent)
+        try:
+            content = store.artifacts.get(model_id)
+            model = model or _prepare(model_id, content, sent)
+        except (DamagedArtifact, NotFound, BadInput) as error:
+            remedies = other_remedies(active, can_roll_back=len(chain) > 1)
+            if model is None:
+                problems.append(f"model {model_id[:12]} cannot be served: {error}{remedies}")
+                continue
+            problems.append(f"model {model_id[:12]} is served as it was loaded before: {error}{remedies}")
+        misfit = _why_not(model_id, model.sensors, sent)
+        if misfit:
+            return replace(serving, sentence="; ".join([*problems, misfit]))
+        if model_id != chain[0]:
+            problems.append(f"model {model_id[:12]}, active before it, is served")
+        return replace(serving, model=model, sentence="; ".join(problems))
+    return replace(serving, sentence="; ".join(problems))
+
+
+def _in_use(prepared: Prepared, model_id: str, sent: tuple[str, ...] | None) -> ServedModel | None:
+    """The model as it is served already, reading frames whose sensors come in the order of ``sent``."""
+    for (known_id, sensors), model in prepared.items():
+        if known_id == model_id and sent in (None, sensors):
+            return model
+    return None
+
+
+def _prepare(model_id: str, content: bytes, sent: tuple[str, ...] | None) -> ServedModel:
+    model = load(content, expected_id=model_id)
+    if sent is not None and not _why_not(model_id, model.layout.sensors, sent):
+        model = model.with_sensor_order(sent)
+    return ServedModel.prepare(model_id, model)
+
+
+def _why_not(model_id: str, needed: Sequence[str] | None, sent: Sequence[str] | None) -> str:
+    """Why a model cannot read a glove, a clause; "" if it can, or if that cannot be told."""
+    if needed is None or sent is None:
+        return ""
+    name, count = f"model {model_id[:12]}", len(sent)
+    if len(set(sent)) != count:
+        return f"{name} cannot read a glove that names a sensor twice: {', '.join(sent)}"
+    lacking = [sensor for sensor in needed if sensor not in sent]
+    if lacking:
+        return f"{name} needs {_sensors(lacking)}, which this glove does not send"
+    unknown = [sensor for sensor in sent if sensor not in needed]
+    if unknown:
+        return f"{name} does not know {_sensors(unknown)}, which this glove sends"
+    return ""
+
+
+def _sensors(names: Sequence[str]) -> str:
+    listed = ", ".join(names[:MOST_NAMED])
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"sensor{'s' if len(names) > 1 else ''} {listed}{more}"
+
 
 LOOK_EVERY_S = 0.1
 TRY_AGAIN_AFTER_S = 5.0
@@ -37,7 +265,7 @@ class ModelWatcher:
         self,
         open_store: Callable[[], Store],
         metas: GloveMetas,
-        lanes: Callable[[], list[GloveLane]],
+        lanes: Callable[[], list[GlovePipeline]],
         models: ServedModels,
         pose_metas: PoseMetas,
         worn: WornGloves,
@@ -141,7 +369,7 @@ class ModelWatcher:
         except Exception:  # whatever is wrong with one wearer's model, the other gloves keep theirs
             _log.exception("glove %s: its model cannot be prepared", glove)
             serving = self._keep(glove, "the newer one fails here, the log of real time says where")
-        self._worn.put(glove, WornGlove.of(self._metas.of(glove), serving.wearing, serving.latency))
+        self._worn.put(glove, GloveContext.of(self._metas.of(glove), serving.wearing, serving.latency))
         self._serve(glove, serving)
         self._gloves.add(glove)
         self._to_choose.discard(glove)

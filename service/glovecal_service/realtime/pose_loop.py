@@ -4,6 +4,10 @@ Turns go round the models: gloves that share a model share a turn and one predic
 frames, as many of each glove as keep a round of turns to a few milliseconds by what earlier turns cost;
 normally that is all. Under overload it takes one of each glove, and the frames left out are counted: a frame
 costs least in a full turn, so more load never means fewer poses, and every glove gets as many.
+
+The frames of a turn are corrected by their model's effects together, too. A state goes from frame to frame of
+a glove, so where several frames of a glove are in one turn, the first ones of all gloves are corrected first,
+then the second ones, and so on.
 """
 
 from __future__ import annotations
@@ -11,7 +15,8 @@ from __future__ import annotations
 import gc
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from threading import Event
 
@@ -27,15 +32,16 @@ from glovecal_client.wire.pose import (
     encode_pose,
     encode_rotations,
 )
+from glovecal_models.calibration.correction_parts import CorrectionParts, VarianceInflation
+from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_models.calibration.servable import LARGEST_DEG
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
-from glovecal_service.incoming.refusal import Refusal, Refused
-from glovecal_service.realtime.corrected_frames import corrected
-from glovecal_service.realtime.glove_lane import GloveLane
-from glovecal_service.realtime.glove_lanes import GloveLanes
+from glovecal_service.incoming.frame_gate import Refusal, Refused
+from glovecal_service.realtime.frame_record import Effects
+from glovecal_service.realtime.glove_lanes import GlovePipeline, GlovePipelines
+from glovecal_service.realtime.lane_effects import LaneEffects, WornGloves
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
-from glovecal_service.realtime.worn_gloves import WornGloves
 
 OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with the budget of a round this keeps a pose younger than 50 ms."""
@@ -76,14 +82,14 @@ class PoseLoop:
         self._models = models
         self._publish = publish
         self._worn = worn
-        self.gloves = GloveLanes()
-        self._pending: dict[GloveLane, None] = {}
+        self.gloves = GlovePipelines()
+        self._pending: dict[GlovePipeline, None] = {}
         self._looked_for_stale_ns = 0
         self._collected_ns = clock_ns()
         self._failed: set[str] = set()
 
     @property
-    def lanes(self) -> list[GloveLane]:
+    def lanes(self) -> list[GlovePipeline]:
         return self.gloves.all()
 
     def run(self, stopped: Event) -> None:
@@ -95,14 +101,14 @@ class PoseLoop:
         """Wait for a frame, a tenth of a second at most, then serve until nothing is pending."""
         first = self._arrivals.wait()
         if first is not None:
-            self._sort_in([first])
-            self._sort_in(self._arrivals.drain())
+            self._enqueue([first])
+            self._enqueue(self._arrivals.drain())
         while self._pending:
             self._take_turn()
-            self._sort_in(self._arrivals.drain())
-        self._look_around()
+            self._enqueue(self._arrivals.drain())
+        self._housekeeping()
 
-    def _sort_in(self, arrivals: Iterable[Arrival]) -> None:
+    def _enqueue(self, arrivals: Iterable[Arrival]) -> None:
         for arrival in arrivals:
             lane = self.gloves.of(arrival.key, arrival.payload, arrival.received_ns)
             if lane is not None:
@@ -124,8 +130,8 @@ class PoseLoop:
         served = self._serve(model, lanes, limit)
         model.pace.observe(served, time.perf_counter() - started)
 
-    def _serve(self, model: ServedModel, lanes: list[GloveLane], limit: int) -> int:
-        opened: list[tuple[GloveLane, Frame, int]] = []
+    def _serve(self, model: ServedModel, lanes: list[GlovePipeline], limit: int) -> int:
+        opened: list[tuple[GlovePipeline, Frame, int]] = []
         for lane in lanes:
             for frame, received_ns in self._open(lane, limit):
                 try:
@@ -145,7 +151,7 @@ class PoseLoop:
                     lane.refusals.add(_not_predictable(frame, model, "it fails, the log says where"))
         return len(opened)
 
-    def _predict_and_send(self, model: ServedModel, opened: list[tuple[GloveLane, Frame, int]]) -> None:
+    def _predict_and_send(self, model: ServedModel, opened: list[tuple[GlovePipeline, Frame, int]]) -> None:
         readings = np.stack([frame.readings for _, frame, _ in opened]).astype(np.float64)
         refused = model.out_of_range(readings)
         if refused:
@@ -169,7 +175,7 @@ class PoseLoop:
     def _send(
         self,
         model: ServedModel,
-        opened: list[tuple[GloveLane, Frame, int]],
+        opened: list[tuple[GlovePipeline, Frame, int]],
         angles: GloveAngles,
         effect_flags: list[int],
     ) -> None:
@@ -194,7 +200,7 @@ class PoseLoop:
                 record.served(angles.row(row))
                 lane.record = None
 
-    def _serve_uncalibrated(self, lane: GloveLane) -> None:
+    def _serve_uncalibrated(self, lane: GlovePipeline) -> None:
         lane.effects = None
         late_ns = self._worn.of(lane.glove).latency_ns
         for frame, received_ns in self._open(lane, len(lane)):
@@ -209,7 +215,7 @@ class PoseLoop:
             watch = lane.watch_of(frame, None, self._worn.of(lane.glove).sensors)
             watch.add(frame.monotonic_ns, frame.readings, None)
 
-    def _open(self, lane: GloveLane, limit: int) -> list[tuple[Frame, int]]:
+    def _open(self, lane: GlovePipeline, limit: int) -> list[tuple[Frame, int]]:
         self._pending.pop(lane)
         opened = []
         for waiting in lane.newest(limit, clock_ns() - self._oldest_ns):
@@ -218,7 +224,7 @@ class PoseLoop:
                 opened.append((frame, waiting.received_ns))
         return opened
 
-    def _look_around(self) -> None:
+    def _housekeeping(self) -> None:
         now = clock_ns()
         if now - self._looked_for_stale_ns < 100_000_000:
             return
@@ -229,7 +235,7 @@ class PoseLoop:
             self._collected_ns = now
             gc.collect(1)
 
-    def _repeat_stale(self, lane: GloveLane, now: int) -> None:
+    def _repeat_stale(self, lane: GlovePipeline, now: int) -> None:
         """Half a second after the last good frame, and once a second from then on: the last pose, marked."""
         if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS:
             return
@@ -255,3 +261,135 @@ def _simulated(frame: Frame) -> int:
 
 def _age_us(received_ns: int) -> int:
     return min(max((clock_ns() - received_ns) // 1000, 0), 0xFFFFFFFF)
+
+
+_FAULTY_SENSOR = int(PoseFlag.FAULTY_SENSOR)
+
+
+def corrected(
+    model: ServedModel,
+    opened: Sequence[tuple[GlovePipeline, Frame, int]],
+    readings: np.ndarray,
+    angles: GloveAngles,
+    worn: WornGloves,
+) -> tuple[GloveAngles, list[int]]:
+    """``angles`` of the ``opened`` frames with the effects, and flags for each pose.
+
+    ``readings`` (N, S) are theirs. Frames of a glove must be in order; those of several may be mixed.
+    """
+    flags = [0] * len(opened)
+    recorded = [row for row, (lane, _, _) in enumerate(opened) if lane.record is not None]
+    if not model.predictor.has_effects:
+        for lane, _, _ in opened:
+            lane.effects = None
+        for row in recorded:
+            _write_down(model, opened[row], readings[row], angles.row(row), None)
+        return angles, flags
+    turn = _Turn(angles.mean, frozenset(recorded))
+    # What is no number gets no pose, and must not get into a state either.
+    for rows in _successive(opened, np.logical_and.reduce(np.isfinite(angles.mean), axis=1)):
+        gloves = [opened[row][0].effects_of(model) for row in rows]
+        for row, effects in zip(rows, gloves, strict=True):
+            lane, frame, _ = opened[row]
+            flags[row] = effects.begin_frame(frame, worn.of(lane.glove))
+        times = np.array([opened[row][1].monotonic_ns / 1e9 for row in rows])
+        at = slice(None) if len(rows) == len(opened) else np.array(rows)
+        turn.correct(rows, at, gloves, times, readings[at])
+    if turn.inflation is not None:
+        for row in np.flatnonzero(turn.inflation.is_faulty.any(axis=1)).tolist():
+            flags[row] |= _FAULTY_SENSOR
+    for row, effects in turn.recorded.items():
+        _write_down(model, opened[row], readings[row], angles.row(row), effects)
+    return model.predictor.corrected(angles, turn.correction, turn.undefined, turn.inflation), flags
+
+
+def _write_down(
+    model: ServedModel,
+    item: tuple[GlovePipeline, Frame, int],
+    readings: np.ndarray,
+    base: GloveAngles,
+    effects: Effects | None,
+) -> None:
+    """Of several frames of a glove the last one stays."""
+    lane, frame, _ = item
+    record = lane.record
+    if record is not None:
+        record.predicted(model, frame, readings, base, effects)
+
+
+def _successive(
+    opened: Sequence[tuple[GlovePipeline, Frame, int]], is_wanted: np.ndarray
+) -> Sequence[list[int]]:
+    """Rows of the gloves' first frames, of their second ones ..."""
+    wanted: list[bool] = is_wanted.tolist()
+    successive: list[list[int]] = []
+    taken: defaultdict[GlovePipeline, int] = defaultdict(int)
+    for row, (lane, _, _) in enumerate(opened):
+        if wanted[row]:
+            if taken[lane] == len(successive):
+                successive.append([])
+            successive[taken[lane]].append(row)
+            taken[lane] += 1
+    return successive
+
+
+class _Turn:
+    """What the effects say about the N frames of a turn."""
+
+    def __init__(self, base: np.ndarray, wanted: frozenset[int]) -> None:
+        """What happens to the rows ``wanted`` is kept in ``recorded``."""
+        self._base, self._wanted = base, wanted
+        self.recorded: dict[int, Effects] = {}
+        self.correction = np.zeros_like(base)
+        self.undefined: np.ndarray | None = None
+        self.inflation: VarianceInflation | None = None
+
+    def correct(
+        self,
+        numbers: Sequence[int],
+        rows: slice | np.ndarray,
+        gloves: Sequence[LaneEffects],
+        time_s: np.ndarray,
+        readings: np.ndarray,
+    ) -> None:
+        """Frames ``numbers``, one of each glove; ``rows`` are the same as an index."""
+        wanted = self._wanted.intersection(numbers) if self._wanted else self._wanted
+        parts = CorrectionParts(len(numbers), self._base.shape[1]) if wanted else None
+        found = EffectCorrection.of_frames(
+            [glove.stream for glove in gloves],
+            time_s,
+            self._base[rows],
+            readings,
+            [glove.context for glove in gloves],
+            [glove.wearing for glove in gloves],
+            parts,
+        )
+        if parts is not None:
+            for at, (row, glove) in enumerate(zip(numbers, gloves, strict=True)):
+                if row in wanted:
+                    self.recorded[row] = Effects(
+                        found.degrees[at : at + 1], parts.of_frame(at), glove.stream, glove.context,
+                        glove.wearing, glove.since_start_s,
+                    )  # fmt: skip
+        self.correction[rows] = found.degrees
+        if found.undefined is not None:
+            self.undefined = self._none() if self.undefined is None else self.undefined
+            self.undefined[rows] = found.undefined
+        if found.inflation is not None:
+            self.inflation = self.inflation or VarianceInflation(np.zeros_like(self._base), self._none())
+            self.inflation.variance[rows], self.inflation.is_faulty[rows] = found.inflation
+        is_usable = usable_correction(found.degrees)
+        if not found.problems and found.undefined is None and is_usable.all():
+            for glove in gloves:
+                glove.end_frame("", is_undefined=False)
+            return
+        usable: list[bool] = np.all(is_usable, axis=1).tolist()
+        for row, glove in enumerate(gloves):
+            problem = "" if usable[row] else "a correction is no number, or more than a full turn"
+            glove.end_frame(
+                found.problems.get(row, problem),
+                is_undefined=found.undefined is not None and bool(found.undefined[row].any()),
+            )
+
+    def _none(self) -> np.ndarray:
+        return np.zeros(self._base.shape, dtype=bool)

@@ -14,18 +14,17 @@ import zenoh
 from glovecal_client.keys import GloveKeys, all_gloves, service_alive_key
 from glovecal_client.session import open_router
 from glovecal_client.wire.pose import POSE_ENCODING
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.incoming.arrivals import Arrivals
 from glovecal_service.operating_system import go_first
 from glovecal_service.plain import reason_of
-from glovecal_service.realtime.glove_metas import GloveMetas
+from glovecal_service.realtime.lane_effects import WornGloves
 from glovecal_service.realtime.live_explanations import LiveExplanations
 from glovecal_service.realtime.model_watcher import ModelWatcher
 from glovecal_service.realtime.pose_loop import PoseLoop
-from glovecal_service.realtime.pose_meta import PoseMetas
+from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas
 from glovecal_service.realtime.served_model import ServedModels
 from glovecal_service.realtime.service_status import ServiceStatus
-from glovecal_service.realtime.worn_gloves import WornGloves
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 

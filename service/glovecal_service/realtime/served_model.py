@@ -12,9 +12,8 @@ from glovecal_client.wire.pose import model_bytes
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.servable import check_servable
-from glovecal_models.calibration.wearer_fit import WearerFit
-from glovecal_service.incoming.refusal import Refusal, Refused
+from glovecal_models.calibration.servable import WearerFit, check_servable
+from glovecal_service.incoming.frame_gate import Refusal, Refused
 
 # How many frames one turn may hold so that it ends within a time budget.
 

@@ -13,17 +13,13 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import json_object
+from glovecal_client.session import json_object
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.incoming.arrivals import Arrivals
-from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS
-from glovecal_service.incoming.refusal import Refusal, Refused
-from glovecal_service.incoming.sequence_order import SequenceOrder
-from glovecal_service.recorder.capture_log import CaptureLog
-from glovecal_service.recorder.pre_roll import PreRoll
-from glovecal_service.recorder.pre_roll_request import PreRollRequest
-from glovecal_service.recorder.reconciliation import OutOfTime, Patience, fill_gaps, reconcile
-from glovecal_service.recorder.recording_account import Settlement, recording_account
+from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, Refusal, Refused, SequenceOrder
+from glovecal_service.recorder.pre_roll import PreRoll, PreRollRequest
+from glovecal_service.recorder.reconciliation import CaptureLog, OutOfTime, Patience, fill_gaps, reconcile
+from glovecal_service.recorder.recording_result import Settlement, recording_account
 from glovecal_service.recorder.run_books import OWN_CLOCK
 from glovecal_service.recorder.run_ledger import RunLedger, decoded
 from glovecal_service.store.recordings import PRE_ROLL

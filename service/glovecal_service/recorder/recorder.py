@@ -1,4 +1,7 @@
-"""Carries out the recordings that the store asks for, through restarts and full disks."""
+"""The recorder process: carries out the recordings that the store asks for, through restarts and full disks.
+
+Its disk, its database and its Python never make a pose wait.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 from typing import Any
 
 import zenoh
@@ -17,18 +20,18 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_client.clock import wall_ns
 from glovecal_client.errors import ClientError, NoAnswer
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask_json
+from glovecal_client.session import ask_json, open_client
 from glovecal_models.errors import BadInput, GlovecalError
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.plain import reason_of
-from glovecal_service.recorder.capture_log import CaptureLog
 from glovecal_service.recorder.live_recording import LiveRecording
-from glovecal_service.recorder.pre_roll_request import pre_roll_request
-from glovecal_service.recorder.reconciliation import Patience, reconcile
-from glovecal_service.recorder.recording_account import Settlement
-from glovecal_service.recorder.recording_result import keep_as_take
+from glovecal_service.recorder.pre_roll import pre_roll_request
+from glovecal_service.recorder.reconciliation import CaptureLog, Patience, reconcile
+from glovecal_service.recorder.recording_result import Settlement, keep_as_take
 from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
+from glovecal_service.recorder.sampling_runner import SamplingRunner
 from glovecal_service.settings import Settings
-from glovecal_service.store.clock import now
+from glovecal_service.store.database import now
 from glovecal_service.store.errors import (
     Conflict,
     DamagedRows,
@@ -375,3 +378,23 @@ def settle(
     finally:
         file.close()
     return Settlement.of(file, outcome, refused=refused)
+
+
+STOP_WITHIN_S = 5.0
+
+
+def run_recorder(settings: Settings, stopped: Event, started: Callable[[], None] | None = None) -> None:
+    """Carry out recordings and samplings until ``stopped``; waits for the router at the start."""
+    pin_blas_to_one_thread()
+    try:
+        with open_client([settings.zenoh], cancelled=stopped.is_set) as session:
+            if started is not None:
+                started()
+            samplings = SamplingRunner(session, settings, lambda: Store.open(settings))
+            thread = Thread(target=samplings.run, args=(stopped,), name="samplings", daemon=True)
+            thread.start()
+            Recorder(session, settings, lambda: Store.open(settings)).run(stopped)
+            thread.join(STOP_WITHIN_S)
+    except NoAnswer:
+        if not stopped.is_set():
+            raise

@@ -8,11 +8,9 @@ from shutil import disk_usage
 from typing import Any
 
 from glovecal_client.errors import WireError
-from glovecal_client.frame_log import FrameLog
-from glovecal_client.log_records import Recording
+from glovecal_client.frame_log import FrameLog, Recording
 from glovecal_client.wire.frame import Frame, decode_frame
-from glovecal_service.recorder.run_books import RunBooks
-from glovecal_service.recorder.sequence_ranges import SequenceRanges
+from glovecal_service.recorder.run_books import RunBooks, SequenceRanges
 from glovecal_service.store.recordings import with_pre_roll
 
 SUFFIX = ".glog"

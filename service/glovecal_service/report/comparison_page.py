@@ -3,258 +3,198 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from markupsafe import Markup
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.comparison.compare import Comparison, summed_up
-from glovecal_models.comparison.floor_estimate import ORDER, NoiseFloor
-from glovecal_models.comparison.noise_floor import RotationNoise, rotation_noise
-from glovecal_models.comparison.residuals import Residuals, residuals
-from glovecal_models.comparison.text import rotation_sentence, wearing_error_sentences
-from glovecal_models.comparison.where_it_fails import RotationFindings, WhereItFails, where_it_fails
-from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.takes.take import Take
-from glovecal_service.report.caption import ReportedModel
-from glovecal_service.report.comparison_pictures import (
-    errors_and_floors,
-    floors_sentence,
-    heat_map,
-    heat_sentence,
-    side_by_side,
-)
-from glovecal_service.report.effects import curves_of, effect_card, parameters_of
-from glovecal_service.report.error_fall import lineage_fall
-from glovecal_service.report.fingertips import fingertips_part
-from glovecal_service.report.html import (
-    Fact,
+from glovecal_models.comparison.answer import Comparison, SideBySide, seen_note
+from glovecal_models.comparison.error_spectrum import SLOW_HZ, ErrorSpectrum
+from glovecal_models.comparison.noise_floor import RotationNoise
+from glovecal_models.comparison.residuals import Residuals, TakeResiduals
+from glovecal_models.comparison.where.answer import CLOSE_UPS, SMALL, WhereItFails
+from glovecal_models.comparison.where_it_fails import windows
+from glovecal_models.effect_block import block_of
+from glovecal_models.improvement.fall.lineage import lineage_fall
+from glovecal_models.presentation.document import (
+    Chart,
+    Column,
+    Note,
+    Part,
+    Pictures,
+    Presentation,
     Section,
-    beside,
+    Table,
     counted,
-    figure,
-    listed,
-    note,
-    page,
-    paragraph,
-    table,
+    first_of,
 )
-from glovecal_service.report.rotation_pictures import (
-    error_against,
-    error_by_wearing,
-    measured_against_predicted,
-    over_time,
-    spectrum_of,
-)
+from glovecal_models.presentation.drawing import FLOOR, MEASURED, MODEL, QUIET, legend_above
+from glovecal_models.takes.take import Take
 
-CLOSE_UPS = 3
-"""Rotations with pictures of their own, those farthest above their floor."""
-NAMED_TAKES = 12
-
-ERRORS = (
-    *("rotation", "RMSE", "noise floor", "mean |error|", "bias", "95 % below"),
-    *("within 1 SD", "NLPD", "error when predicting the mean"),
-)
-SCALES = (
-    "Degrees; noise floors with their 95 % intervals. Within 1 SD: expected 68 %. NLPD: mean negative log "
-    "predictive density in nats; expected ln(RMSE) + 1.42 for a correct standard deviation of constant size."
-)
-FLOORS = (
-    "Every estimate that these takes allow, in degrees with 95 % intervals; the first one of a row counts. "
-    "Spectrum and frame to frame are lower bounds: they do not include autocorrelated noise."
-)
+MOST_POINTS = 1500
+SHOWN_S = 12.0
 
 
-def report_page(
-    main: ReportedModel,
-    takes: Sequence[Take],
-    others: Sequence[ReportedModel] = (),
-    *,
+def comparison_page(
+    model: CalibrationModel,
+    compared: Comparison,
+    where: WhereItFails,
+    found: Residuals,
+    noise: Mapping[str, RotationNoise],
+    others: Sequence[Comparison] = (),
     ancestors: Sequence[CalibrationModel] = (),
     simpler: Mapping[str, CalibrationModel] | None = None,
-    dimensions: HandDimensions | None = None,
-    ceiling: Mapping[str, Any] | None = None,
-) -> str:
-    """HTML, ``main`` looked at closely. Raises LayoutMismatch, and BadInput when nothing was measured.
+) -> Presentation:
+    """``model`` looked at closely, ``others`` beside it.
 
-    ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``main``.
-    ``dimensions`` of the subject's hand, for the errors of fingertips; ``ceiling`` of ``main``, where known.
+    ``ancestors``, oldest first, and ``simpler`` calibrations show how the error fell down to ``model``.
     """
-    found = residuals(main.model, takes)
-    noise = rotation_noise(found)
-    numbers, where = summed_up(found, noise, dimensions=dimensions), where_it_fails(found, noise=noise)
-    sections = [
-        Section("Models side by side", _side_by_side(main, numbers, takes, others)),
-        Section("How the error falls", _fall(main, ancestors, simpler or {}, takes, numbers)),
-        Section("Effects in the model", _effects(main.model)),
-        Section(
-            "Error and noise floor",
-            [figure(errors_and_floors(where), floors_sentence(where)), *_table(numbers, where)],
-        ),
-        Section("Fingertips", fingertips_part(numbers.fingertips, dimensions)),
-        Section("What the error depends on", [figure(heat_map(where), heat_sentence(where))]),
-        *(_close_up(item, found, noise[item.rotation]) for item in where.rotations[:CLOSE_UPS]),
-        Section("Worst stretches", [_stretches(where)]),
-        Section("Noise floors", _floors(where)),
-        Section("Details", [_details(main, others, takes)]),
-    ]
-    title = f"Errors of {main.title} ({counted(len(takes), 'take')})"
-    summary = _summary(main, numbers, where)
-    if ceiling is not None:
-        summary.insert(-1, Fact("Ceiling", ceiling["sentence"]))
-    return page(title, summary, sections, notes=_notes(main, others, takes))
-
-
-def _summary(main: ReportedModel, numbers: Comparison, where: WhereItFails) -> list[Fact]:
-    overall, worst = numbers.overall, where.rotations[0]
-    done = sum(item.is_at_floor for item in where.rotations)
-    floor = "" if overall.floor is None else f"; noise floor {_floor(overall.floor)}"
-    is_done = done == len(where.rotations)
-    verdict = (
-        f"All of {counted(done, 'rotation')} are at their noise floor."
-        if is_done
-        else f"{len(where.rotations) - done} of {counted(len(where.rotations), 'rotation')} above their "
-        "noise floor."
-    )
-    size = (
-        f"RMSE {overall.rmse_deg:.2f} degrees over {counted(len(numbers.rotations), 'rotation')}{floor}; "
-        f"error when predicting the mean: {overall.baseline_deg:.1f}"
-    )
-    claimed = f"{100 * overall.coverage:.0f} % of errors within one claimed SD (expected: 68 %)"
-    verb = "model activate" if is_done else "diagnose"
-    wearings = wearing_error_sentences(numbers)
-    return [
-        Fact("Verdict", verdict),
-        *([Fact("Wearings", " ".join(wearings))] if wearings else []),
-        Fact("Size", size),
-        Fact("Claimed SD", claimed),
-        Fact("Place", f"largest possible improvement: {rotation_sentence(worst)}"),
-        Fact("Next", f"glovecal {verb} {main.id[:12]}", is_command=True),
-    ]
-
-
-def _notes(main: ReportedModel, others: Sequence[ReportedModel], takes: Sequence[Take]) -> list[Markup]:
-    warnings = []
-    if any(take.simulated for take in takes):
-        warnings.append("At least one of these takes comes from a simulated glove.")
-    seen = [one for one in (main, *others) if one.trained_on]
-    if seen:
-        named = "; ".join(f"{one.name} was trained on {len(one.trained_on)} of these takes" for one in seen)
-        warnings.append(f"Not a held-out error: {named}.")
-    return [note("", warnings)] if warnings else []
-
-
-def _side_by_side(
-    main: ReportedModel, numbers: Comparison, takes: Sequence[Take], others: Sequence[ReportedModel]
-) -> list[Markup]:
-    """Nothing for one model."""
-    if not others:
-        return []
-    models = {main.name: numbers}
-    models |= {other.name: summed_up(residuals(other.model, takes)) for other in others}
-    return [figure(*side_by_side(models))]
-
-
-def _fall(
-    main: ReportedModel,
-    ancestors: Sequence[CalibrationModel],
-    simpler: Mapping[str, CalibrationModel],
-    takes: Sequence[Take],
-    numbers: Comparison,
-) -> list[Markup]:
-    """The versions before this one; nothing for a first version."""
-    if not ancestors:
-        return []
-    return [figure(*lineage_fall([*ancestors, main.model], simpler, takes, numbers.overall))]
-
-
-def _effects(model: CalibrationModel) -> list[Markup]:
-    return [
-        effect_card(added.name, parameters_of(added), added.settings.get("declaration"), curves_of(added))
-        for added in model.effects
-    ]
-
-
-def _close_up(item: RotationFindings, found: Residuals, noise: RotationNoise) -> Section:
-    """One rotation with its pictures."""
-    figures = [measured_against_predicted(found, item.rotation)]
-    if noise.spectrum is not None:
-        figures.append(spectrum_of(noise.spectrum, item.rotation))
-    figures += [error_against(item, one) for one in (item.structure or item.dependences)[:2]]
-    if item.wearings is not None:
-        figures.append(error_by_wearing(item.wearings))
-    return Section(
-        f"Rotation {item.rotation}",
+    takes = [item.take for item in found.takes]
+    line, scale = [*ancestors, model], simpler or {}
+    fall: list[Part] = [lineage_fall(line, scale, takes, compared.overall)] if ancestors else []
+    effects = [block_of(one) for one in model.effects]
+    pictures = {
+        item.rotation: _pictures(found, noise[item.rotation], item.rotation)
+        for item in where.rotations[:CLOSE_UPS]
+    }
+    beside: list[Part] = [SideBySide([compared, *others]).chart()] if others else []
+    simulated = ["At least one of these takes comes from a simulated glove."] * compared.simulated
+    return Presentation(
+        f"Errors of {compared.title} ({counted(len(takes), 'take')})",
+        [where.verdict, *compared.facts, *where.place, *compared.known_ceiling, *where.next],
+        [*(Note("", [sentence]) for sentence in simulated), *seen_note([compared, *others])],
         [
-            paragraph(rotation_sentence(item)),
-            figure(*over_time(found, item.rotation)),
-            beside([figure(*one) for one in figures]),
+            Section("Models side by side", beside),
+            Section("How the error falls", fall),
+            Section("Effects in the model", effects),
+            *compared.sections,
+            *where.sections(pictures),
+            Section("Details", [_details(model, [compared, *others], takes)]),
         ],
     )
 
 
-def _details(main: ReportedModel, others: Sequence[ReportedModel], takes: Sequence[Take]) -> Markup:
+def _pictures(found: Residuals, noise: RotationNoise, rotation: str) -> list[Part]:
+    small = [measured_against_predicted(found, rotation)]
+    if noise.spectrum is not None:
+        small.append(spectrum_of(noise.spectrum, rotation))
+    return [over_time(found, rotation), Pictures(small)]
+
+
+def _details(model: CalibrationModel, compared: Sequence[Comparison], takes: Sequence[Take]) -> Table:
     frames = sum(len(take.time_s) for take in takes)
-    names = ", ".join(take.name for take in takes[:NAMED_TAKES]) + (
-        " ..." if len(takes) > NAMED_TAKES else ""
+    main, *others = compared
+    rows = [
+        ("model", main.model), ("method", model.method), ("subject", model.subject),
+        ("layout", model.layout.name),
+        ("takes", f"{first_of([take.name for take in takes])}; {frames} frames"),
+        *((other.name, other.model) for other in others),
+    ]  # fmt: skip
+    return Table([Column("detail", ""), Column("value", "")], rows)
+
+
+def over_time(found: Residuals, rotation: str) -> Chart:
+    """Prediction with its claimed band and measurement, errors below, around the worst time; and where."""
+    column = found.column(rotation)
+    item, rows = _worst_window(found, column)
+    time = item.take.time_s[rows] - item.take.start_s
+    predicted, sd = item.predicted[rows, column], item.sd[rows, column]
+    measured, error = item.measured[rows, column], item.error[rows, column]
+
+    def draw(figure: Figure) -> None:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        band = (predicted - 2 * sd, predicted + 2 * sd)
+        above.fill_between(time, *band, color=MODEL, alpha=0.2, linewidth=0, label="± 2 claimed sd")
+        above.plot(time, predicted, color=MODEL, linewidth=1.2, label="predicted")
+        above.plot(time, measured, color=MEASURED, linewidth=1.2, linestyle=":", label="measured")
+        above.set_ylabel(f"{rotation}, degrees")
+        legend_above(above)
+        below.fill_between(time, -2 * sd, 2 * sd, color=MODEL, alpha=0.2, linewidth=0)
+        below.axhline(0, color=QUIET)
+        below.plot(time, error, color=MODEL, linewidth=1)
+        below.set(xlabel=f"seconds of take {item.take.name}", ylabel="error, degrees")
+
+    known = np.isfinite(error)
+    outside = float(np.mean(np.abs(error[known]) > 2 * sd[known])) if known.any() else 0.0
+    sentence = (
+        f"Take {item.take.name}, {time[0]:.0f} to {time[-1]:.0f} s: {100 * outside:.0f} % of errors are "
+        "outside two claimed standard deviations (expected: 5 %)."
     )
-    rows = [
-        ("model", main.id),
-        ("method", main.model.method),
-        ("subject", main.model.subject),
-        ("layout", main.model.layout.name),
-        ("takes", f"{names}; {frames} frames"),
-        *((other.name, other.id) for other in others),
-    ]
-    return table(("", ""), rows)
+    return Chart(None, 9, 4, sentence, panels=draw)
 
 
-def _table(numbers: Comparison, where: WhereItFails) -> list[Markup]:
-    named = [("all", numbers.overall)]
-    named += [(item.rotation, numbers.rotations[item.rotation]) for item in where.rotations]
-    rows = [
-        (
-            name, f"{one.rmse_deg:.2f}", _floor(one.floor), f"{one.mae_deg:.2f}", f"{one.bias_deg:+.2f}",
-            f"{one.percentile_95_deg:.2f}", f"{100 * one.coverage:.0f} %",
-            "-" if one.nlpd is None else f"{one.nlpd:.2f}", f"{one.baseline_deg:.1f}",
-        )
-        for name, one in named
-    ]  # fmt: skip
-    return [table(ERRORS, rows), paragraph(SCALES)]
+def _worst_window(found: Residuals, column: int) -> tuple[TakeResiduals, np.ndarray]:
+    """The take and frames (every so many) of the worst ``SHOWN_S`` seconds of a rotation."""
+    best: tuple[float, TakeResiduals, slice] | None = None
+    for item in found.takes:
+        time, squared = item.take.time_s, item.error[:, column] ** 2
+        for rows in windows(time, SHOWN_S):
+            known = squared[rows][np.isfinite(squared[rows])]
+            if len(known) > 1 and (best is None or known.mean() > best[0]):
+                best = (float(known.mean()), item, rows)
+    if best is None:
+        item = max(found.takes, key=lambda one: int(np.isfinite(one.error[:, column]).sum()))
+        return item, np.arange(len(item.take.time_s))
+    _, item, rows = best
+    return item, np.arange(rows.start, rows.stop)[:: -(-(rows.stop - rows.start) // MOST_POINTS)]
 
 
-def _floor(floor: NoiseFloor | None) -> str:
-    if floor is None:
-        return "unknown"
-    least = "at least " if floor.is_lower_bound else ""
-    return f"{least}{_with_interval(floor)}{'' if floor.is_reliable else ', not reliable'}"
+def measured_against_predicted(found: Residuals, rotation: str) -> Chart:
+    """Every frame as a point (at most ``MOST_POINTS``), the line through them, and where that line is off."""
+    column = found.column(rotation)
+    measured, predicted = found.stacked("measured")[:, column], found.stacked("predicted")[:, column]
+    known = np.isfinite(measured) & np.isfinite(predicted)
+    measured, predicted = measured[known], predicted[known]
+    low, high = np.percentile(measured, [2.5, 97.5])
+    ends = np.array([low, high])
+    slope = _slope(measured, predicted)
+    line = predicted.mean() + slope * (ends - measured.mean())
+    scatter = float(np.std(predicted - slope * measured))
+    step = -(-len(measured) // MOST_POINTS)
+
+    def draw(axes: Axes) -> None:
+        axes.plot(measured[::step], predicted[::step], ".", color=MODEL, alpha=0.35, markersize=3)
+        axes.axline((float(low), float(low)), slope=1, color=MEASURED, linewidth=1, label="no error")
+        axes.plot(ends, line, color=FLOOR, linewidth=1.5, label="linear fit")
+        axes.set(xlabel=f"{rotation} measured, degrees", ylabel="predicted, degrees")
+        legend_above(axes, 2)
+
+    low_off, high_off = line - ends
+    sentence = (
+        f"From {round(low)} to {round(high)} degrees (95 % of frames) the linear fit is off by "
+        f"{low_off:+.1f} degrees at the low end and {high_off:+.1f} at the high end; residual SD "
+        f"{scatter:.1f} degrees."
+    )
+    return Chart(draw, *SMALL, sentence)
 
 
-def _with_interval(floor: NoiseFloor) -> str:
-    return f"{floor.floor_deg:.2f} ({floor.low_deg:.2f}-{floor.high_deg:.2f})"
+def _slope(measured: np.ndarray, predicted: np.ndarray) -> float:
+    centred = measured - measured.mean()
+    square = float(centred @ centred)
+    return float(centred @ predicted) / square if square > 0 else 1.0
 
 
-def _floors(where: WhereItFails) -> list[Markup]:
-    rows = []
-    for item in where.rotations:
-        every = (item.floor, *item.other_floors) if item.floor is not None else ()
-        cells = {one.how: _with_interval(one) for one in every}
-        rows.append((item.rotation, *(cells.get(how, "-") for how in ORDER)))
-    doubts: dict[str, list[str]] = {}
-    for item in where.rotations:
-        for reason in item.floor.reasons if item.floor is not None else ():
-            doubts.setdefault(reason, []).append(item.rotation)
-    told = [f"Not reliable ({', '.join(names)}): {reason}." for reason, names in doubts.items()]
-    return [table(("rotation", *ORDER), rows), paragraph(FLOORS), *([listed(told)] if told else [])]
+def spectrum_of(spectrum: ErrorSpectrum, rotation: str) -> Chart:
+    """The error's spectrum with the plateau of its noise, and how much of it is slow."""
+    frequency, density = spectrum.frequency_hz, spectrum.density
 
+    def draw(axes: Axes) -> None:
+        axes.axvspan(frequency[0], SLOW_HZ, color=QUIET, alpha=0.4, linewidth=0, label="slow")
+        axes.plot(frequency, np.maximum(density, 1e-12), color=MODEL, linewidth=1.2)
+        if spectrum.plateau_density > 0:
+            axes.axhline(spectrum.plateau_density, color=FLOOR, linestyle="--", label="white-noise plateau")
+        axes.set(xscale="log", yscale="log", xlabel="hertz", ylabel="error, degrees² / hertz")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
+        legend_above(axes, 2)
 
-def _stretches(where: WhereItFails) -> Markup:
-    heads = ("take", "when", "pose", "RMSE, degrees", "worst rotation", "its RMSE")
-    rows = [
-        (
-            one.take, f"{one.start_s:.1f} to {one.end_s:.1f} s", one.pose or "-", f"{one.rmse_deg:.1f}",
-            one.rotation, f"{one.rotation_rmse_deg:.1f}",
-        )
-        for one in where.stretches
-    ]  # fmt: skip
-    return table(heads, rows)
+    sentence = (
+        f"{100 * spectrum.slow_share:.0f} % of the variance of {rotation}'s error is slower than "
+        f"{SLOW_HZ:.0f} Hz (95 % interval {100 * spectrum.slow_low:.0f} to {100 * spectrum.slow_high:.0f}); "
+        f"white noise from the plateau: {spectrum.plateau.floor_deg:.2f} degrees."
+    )
+    return Chart(draw, *SMALL, sentence)

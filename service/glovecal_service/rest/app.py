@@ -13,54 +13,53 @@ from fastapi import APIRouter, FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.routing import BaseRoute
 
-from glovecal_models.threads import pin_blas_to_one_thread
+from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.questions.catalogue import ANSWERED
+from glovecal_service.rest import asking
 from glovecal_service.rest.effect import (
     catalogue,
-    changes,
-    detectability,
-    diagnosis,
-    improvement,
     picture,
     trial,
 )
-from glovecal_service.rest.glove import camera_files, cameras, commands, films, layouts, live, recordings
-from glovecal_service.rest.http import front, health
-from glovecal_service.rest.http.answers import install_openapi
-from glovecal_service.rest.http.body_guard import BodyGuard
+from glovecal_service.rest.first_run import hidden_effects, simulated_glove
+from glovecal_service.rest.glove import (
+    camera_files,
+    cameras,
+    commands,
+    connecting,
+    films,
+    layouts,
+    live,
+    recordings,
+)
+from glovecal_service.rest.http import health
 from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
-from glovecal_service.rest.http.metrics import Metrics
-from glovecal_service.rest.http.observation import PREFIX, Observation
-from glovecal_service.rest.http.request_guard import RequestGuard, is_loopback
+from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
+from glovecal_service.rest.http.problem import install_openapi
+from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, is_loopback
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
 from glovecal_service.rest.model import (
-    ceiling,
     comparison,
-    explanation,
     fall,
     model_import,
     models,
     predictions,
-    quick_check,
     refinement,
-    replay,
-    residual_column,
-    series,
-    training,
+    residuals,
     vendor_calibrations,
-    where,
 )
+from glovecal_service.rest.overview import overview
 from glovecal_service.rest.sampling import next_steps, samplings
 from glovecal_service.rest.subject import subjects, usual_hand
 from glovecal_service.rest.take import (
     clocks,
-    examination,
     hands,
-    holds,
     motion,
     reference,
+    series,
     session_drift,
     table_import,
     takes,
@@ -79,13 +78,14 @@ MULTIPART_BYTES = 10_000
 BODY_PATIENCE_S = 30.0
 FIRST_SWEEP_AFTER_S, SWEEP_EVERY_S = 60.0, 3600.0
 ROUTERS = (
+    asking,
     *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, camera_files, samplings),
+    *(connecting, simulated_glove, hidden_effects),
     *(
         clocks,
         hands,
+        series,
         session_drift,
-        holds,
-        examination,
         table_import,
         takes,
         reference,
@@ -94,33 +94,22 @@ ROUTERS = (
         videos,
     ),
     *(
-        training,
         model_import,
         vendor_calibrations,
         refinement,
         models,
         predictions,
         comparison,
-        where,
-        ceiling,
-        diagnosis,
-        changes,
         catalogue,
-        improvement,
     ),
     *(
-        detectability,
-        explanation,
-        quick_check,
         next_steps,
-        series,
-        residual_column,
-        replay,
+        residuals,
         picture,
         fall,
         trial,
     ),
-    *(jobs, health),
+    *(jobs, overview, health),
 )
 
 
@@ -147,7 +136,7 @@ def create_app(
         uploads_folder = UploadFolder(settings.uploads_folder)
         await run_in_threadpool(uploads_folder.sweep)
         app.state.parts = Parts(settings, opened, uploads_folder, metrics, Predictors(opened))
-        dispatcher = Dispatcher(opened, settings, of_one_command=of_one_command)
+        dispatcher = Dispatcher(opened, settings, ANSWERED, of_one_command=of_one_command)
         dispatcher.start()
         sweeping = asyncio.create_task(_sweep_hourly(opened, settings))
         try:
@@ -156,6 +145,7 @@ def create_app(
             sweeping.cancel()
             await run_in_threadpool(app.state.parts.filming.close)
             await run_in_threadpool(app.state.parts.cameras.close)
+            await run_in_threadpool(app.state.parts.streamed_glove.stop)
             await run_in_threadpool(dispatcher.stop)
             if store is None:
                 opened.close()
@@ -179,7 +169,7 @@ def create_app(
 
 
 def _routers() -> list[tuple[str, APIRouter]]:
-    return [("", front.router), *((PREFIX, noun.router) for noun in ROUTERS)]
+    return [("", health.pages), *((PREFIX, noun.router) for noun in ROUTERS)]
 
 
 @cache

@@ -5,19 +5,23 @@ and one writer do not wait for each other; ``synchronous=FULL`` so that an ackno
 power cut; ``BEGIN IMMEDIATE`` for writing so that a transaction waits for the lock at its start instead of
 failing in its middle. Python's own transaction handling is switched off (``isolation_level=None``), or
 schema changes would commit half-way.
+
+Here too: the time and the identifiers that rows get, and the number that grows with what they hold.
 """
 
 from __future__ import annotations
 
 import logging
+import secrets
 import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, select, update
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -31,8 +35,19 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
+from glovecal_service.store import tables
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
-from glovecal_service.store.json_text import json_text
+from glovecal_service.store.texts import json_text
+
+
+def now() -> datetime:
+    return datetime.now(UTC)
+
+
+def new_id() -> str:
+    """A short random identifier: 48 bits, hexadecimal."""
+    return secrets.token_hex(6)
+
 
 log = logging.getLogger("glovecal.store")
 BUSY_TIMEOUT_MS = 5000
@@ -218,3 +233,30 @@ def _disk_is_full(database: Database) -> bool:
         return shutil.disk_usage(database.file.parent).free < LEAST_ROOM_BYTES
     except OSError:
         return False
+
+
+def grow_revision(connection: Connection) -> int:
+    """Add one inside the caller's transaction: the real-time process has something to look at.
+
+    The row is locked until that transaction ends, so whatever else grows the revision is done one after
+    the other on PostgreSQL too.
+    """
+    statement = update(tables.revision).values(value=tables.revision.c.value + 1)
+    value = connection.scalar(statement.returning(tables.revision.c.value))
+    if value is None:
+        raise StoreDamaged("the revision of the store is missing; restore a backup of the database")
+    return int(value)
+
+
+class Revision:
+    """Reads the number; cheap enough to poll ten times a second."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def __call__(self) -> int:
+        with self._database.read() as connection:
+            value = connection.scalar(select(tables.revision.c.value))
+        if not isinstance(value, int):
+            raise StoreDamaged("the revision of the store is missing; restore a backup of the database")
+        return value

@@ -10,10 +10,9 @@ from sqlalchemy import Connection, Row, insert, select, update
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, subject_name
-from glovecal_models.takes.known_latency import KnownLatency
-from glovecal_service.store import revision, tables
-from glovecal_service.store.clock import now
-from glovecal_service.store.database import Database
+from glovecal_models.takes.take import KnownLatency
+from glovecal_service.store import tables
+from glovecal_service.store.database import Database, grow_revision, now
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.records import GloveRecord, TakeRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
@@ -40,12 +39,12 @@ class Gloves:
             if earlier is None:
                 values = {**said, "name": glove, "first_seen_at": said["last_seen_at"]}
                 connection.execute(insert(tables.gloves).values(**values))
-                revision.grow(connection)
+                grow_revision(connection)
             else:
                 _keep_chosen_wearer(said, earlier)
                 _change(connection, glove, said)
                 if any(said[name] != getattr(earlier, name) for name in _WEARER):
-                    revision.grow(connection)
+                    grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
     def get(self, name: str) -> GloveRecord:
@@ -80,7 +79,7 @@ class Gloves:
                 "assigned_run_id": earlier.run_id if earlier else None,
             }
             _change(connection, glove, chosen)
-            revision.grow(connection)
+            grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
     def set_latency(self, glove: str, latency: Mapping[str, Any] | None) -> GloveRecord:
@@ -91,7 +90,7 @@ class Gloves:
             if _find(connection, glove) is None:
                 connection.execute(insert(tables.gloves).values(**_unseen(glove, now())))
             _change(connection, glove, {"latency": None if latency is None else dict(latency)})
-            revision.grow(connection)
+            grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
 

@@ -14,13 +14,13 @@ from datetime import datetime
 from functools import partial
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, select
+from sqlalchemy import Connection, Select, func, insert, select
 
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
-from glovecal_service.store.clock import new_id, now
-from glovecal_service.store.database import Database
+from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound, StoreDamaged
+from glovecal_service.store.list_part import WHOLE, ListPart
 from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 
@@ -30,6 +30,7 @@ LONGEST_SENTENCE = 2000
 LONGEST_TRACEBACK = 8000
 """Characters; the innermost calls stand at its end."""
 _HIDDEN = ("lease_until", "losses")
+_SEARCHED = ("^id", "kind", "subject", "state", "error", "^payload.model", "payload.effect")
 
 
 class Jobs:
@@ -186,16 +187,20 @@ class Jobs:
             _require(connection, id)
             return sound_rows(connection, table, statement, lambda values: JobEvent(**values))
 
-    def list(self, *, subject: str | None = None, only_unfinished: bool = False) -> list[JobRecord]:
+    def list(
+        self, *, subject: str | None = None, only_unfinished: bool = False, part: ListPart = WHOLE
+    ) -> list[JobRecord]:
         """Jobs, newest first."""
-        table = tables.jobs
-        statement = select(table).order_by(table.c.created_at.desc(), table.c.id)
-        if subject is not None:
-            statement = statement.where(table.c.subject == subject)
-        if only_unfinished:
-            statement = statement.where(table.c.state.not_in(FINISHED_JOB_STATES))
+        chosen = part.of(_chosen(subject, only_unfinished), tables.jobs, _SEARCHED, newest_first=True)
         with self._database.read() as connection:
-            return sound_rows(connection, table, statement, _record)
+            return sound_rows(connection, tables.jobs, chosen, _record)
+
+    def count(
+        self, *, subject: str | None = None, only_unfinished: bool = False, part: ListPart = WHOLE
+    ) -> int:
+        """How many of them hold the text of ``part``."""
+        with self._database.read() as connection:
+            return part.count(connection, _chosen(subject, only_unfinished), tables.jobs, _SEARCHED)
 
     def unfinished(self) -> dict[str, int]:
         """How many jobs are in each state that is not final."""
@@ -236,6 +241,13 @@ class Jobs:
                     _noted(connection, id)
                     requeued += 1
         return requeued
+
+
+def _chosen(subject: str | None, only_unfinished: bool) -> Select[Any]:
+    table, every = tables.jobs, select(tables.jobs)
+    if subject is not None:
+        every = every.where(table.c.subject == subject)
+    return every.where(table.c.state.not_in(FINISHED_JOB_STATES)) if only_unfinished else every
 
 
 def _plain(sentence: str) -> str:

@@ -11,8 +11,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import BUILT_IN, Layout
 from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
-from glovecal_service.store.clock import now
-from glovecal_service.store.database import Database
+from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import LayoutRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows

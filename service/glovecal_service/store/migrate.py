@@ -13,8 +13,7 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, text
 
 from glovecal_service.store.blobs import full_disk_named
-from glovecal_service.store.clock import now
-from glovecal_service.store.database import Database
+from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import StoreError
 from glovecal_service.store.schema import migrations
 

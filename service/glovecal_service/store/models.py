@@ -7,22 +7,23 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, func, select
+from sqlalchemy import ColumnElement, Connection, Select, String, cast, func, select
 
 from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.hand.handedness import Handedness, is_of_hand, known_hand
+from glovecal_models.hand.rotations import Handedness, is_of_hand, known_hand
 from glovecal_models.names import check_identifier
-from glovecal_service.store import revision, tables
-from glovecal_service.store.artifacts import Artifacts
-from glovecal_service.store.clock import now
-from glovecal_service.store.database import Database
+from glovecal_service.store import tables
+from glovecal_service.store.blobs import Artifacts
+from glovecal_service.store.database import Database, grow_revision, now
 from glovecal_service.store.errors import Conflict, NotFound
-from glovecal_service.store.records import Activation, ModelRecord
-from glovecal_service.store.row_hash import add_row, sound_row, sound_rows
+from glovecal_service.store.list_part import WHOLE, ListPart
+from glovecal_service.store.records import NAME, NOTE, REMOVED, Activation, ModelRecord
+from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 
 SHORTEST_PREFIX = 6
+_SEARCHED = ("^id", "subject", "layout", "method", "facts.name", "facts.note", "facts.effects")
 _PREFIX = re.compile(r"[0-9a-f]{6,64}\Z")
 
 
@@ -69,7 +70,7 @@ class Models:
                         f"model {record.id[:12]} belongs to subject {earlier.subject!r} with layout"
                         f" {earlier.layout!r} already"
                     )
-                return earlier
+                return _changed(connection, earlier, {REMOVED: None}) if earlier.is_removed else earlier
             add_row(connection, tables.models, record.__dict__)
             for take in takes:
                 add_row(connection, tables.model_takes, {"model": record.id, "take": take})
@@ -80,14 +81,48 @@ class Models:
         with self._database.read() as connection:
             return _one(connection, id)
 
-    def list(self, subject: str | None = None, layout: str | None = None) -> list[ModelRecord]:
-        """Models in the order they were added."""
-        statement = select(tables.models).order_by(tables.models.c.created_at, tables.models.c.id)
-        if subject is not None:
-            statement = statement.where(of_subject(tables.models, subject))
+    def describe(self, id: str, *, name: str, note: str) -> ModelRecord:
+        """What people call it; "" for nothing. Raises NotFound, Conflict."""
+        return self._with_facts(id, {NAME: name, NOTE: note})
+
+    def remove(self, id: str) -> ModelRecord:
+        """Leave it out of lists. What was made of it stays, and ``restore`` undoes it. Raises NotFound,
+        Conflict for one that is active."""
+        model = self.get(id)
+        if self.is_active(model):
+            raise Conflict(
+                f"model {model.id[:12]} is active: live poses of {model.subject} come from it. Activate "
+                f"another one first, or roll back: glovecal model rollback --subject {model.subject}"
+            )
+        return self._with_facts(model.id, {REMOVED: now().isoformat()})
+
+    def restore(self, id: str) -> ModelRecord:
+        """Raises NotFound, Conflict."""
+        return self._with_facts(id, {REMOVED: None})
+
+    def _with_facts(self, id: str, facts: Mapping[str, Any]) -> ModelRecord:
+        with self._database.write() as connection:
+            found = _one(connection, id)
+            return _changed(connection, found, facts)
+
+    def list(
+        self,
+        subject: str | None = None,
+        layout: str | None = None,
+        *,
+        removed: bool = False,
+        part: ListPart = WHOLE,
+    ) -> list[ModelRecord]:
+        """Models in the order they were added; with ``removed`` those that were taken out."""
+        chosen = part.of(_chosen(subject, removed), tables.models, _SEARCHED, newest_first=False)
         with self._database.read() as connection:
             wanted = {"subject": subject, "layout": layout}
-            return sound_rows(connection, tables.models, statement, _record, wanted)
+            return sound_rows(connection, tables.models, chosen, _record, wanted)
+
+    def count(self, subject: str | None = None, *, removed: bool = False, part: ListPart = WHOLE) -> int:
+        """How many there are of a subject (None: of all) that hold the text of ``part``."""
+        with self._database.read() as connection:
+            return part.count(connection, _chosen(subject, removed), tables.models, _SEARCHED)
 
     def lineage(self, id: str) -> list[ModelRecord]:
         """The model, its parent, the parent's parent ... Raises NotFound."""
@@ -110,7 +145,7 @@ class Models:
         model = self.get(id)
         self._artifacts.get(model.id)
         with self._database.write() as connection:
-            revision.grow(connection)
+            grow_revision(connection)
             earlier = _current(connection, model.subject, model.layout, model.hand)
             if earlier is not None and earlier.model == model.id:
                 if earlier.id == _newest(connection, model.subject):
@@ -131,7 +166,7 @@ class Models:
                 "which hand: --hand left or --hand right"
             )
         with self._database.write() as connection:
-            revision.grow(connection)
+            grow_revision(connection)
             current = _current(connection, subject, layout, hand)
             target = None if current is None else _before(connection, current, hand)
             if target is None:
@@ -211,6 +246,12 @@ def _effect_names(artifact: bytes) -> dict[str, list[str]]:
     return {"effects": [item["name"] for item in effects]} if effects else {}
 
 
+def _chosen(subject: str | None, removed: bool) -> Select[Any]:
+    is_removed = cast(tables.models.c.facts, String).contains(f'"{REMOVED}":')
+    every = select(tables.models).where(is_removed if removed else ~is_removed)
+    return every if subject is None else every.where(of_subject(tables.models, subject))
+
+
 def _find(connection: Connection, id: str) -> ModelRecord | None:
     row = connection.execute(select(tables.models).where(tables.models.c.id == id)).one_or_none()
     return None if row is None else _record(sound_row(tables.models, row))
@@ -280,7 +321,17 @@ def _activation(connection: Connection, id: int) -> Activation:
     return _activation_record(sound_row(tables.activations, row))
 
 
+def _changed(connection: Connection, model: ModelRecord, facts: Mapping[str, Any]) -> ModelRecord:
+    """``facts`` that are None are taken out."""
+    kept = {**model.facts, **facts}
+    kept = {key: value for key, value in kept.items() if value is not None or key not in facts}
+    change_rows(connection, tables.models, tables.models.c.id == model.id, {"facts": kept})
+    return replace(model, facts=kept)
+
+
 def _append(connection: Connection, model: ModelRecord, kind: str, previous: int | None) -> Activation:
+    if model.is_removed:
+        _changed(connection, model, {REMOVED: None})
     values = {
         "subject": model.subject,
         "layout": model.layout,

@@ -10,9 +10,8 @@ from sqlalchemy import ColumnElement, Connection, select
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, did_you_mean
-from glovecal_service.store import revision, tables
-from glovecal_service.store.clock import new_id, now
-from glovecal_service.store.database import Database
+from glovecal_service.store import tables
+from glovecal_service.store.database import Database, grow_revision, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecord, RecordingState
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
@@ -72,7 +71,7 @@ class Recordings:
             )
         at, id = now(), new_id()
         with self._database.write() as connection:
-            revision.grow(connection)
+            grow_revision(connection)
             worn = connection.execute(
                 select(tables.gloves).where(tables.gloves.c.name == glove)
             ).one_or_none()
@@ -99,7 +98,7 @@ class Recordings:
     def stop(self, id: str) -> RecordingRecord:
         """Ask for the end of a recording; asking again, or after its end, changes nothing."""
         with self._database.write() as connection:
-            revision.grow(connection)
+            grow_revision(connection)
             asked = {STOP_ASKED: time.time()} if _ORDER[_require(connection, id).state] < _STOPPING else {}
             return _move(connection, id, "stopping", asked)
 
@@ -113,7 +112,7 @@ class Recordings:
             raise BadInput(f"{state!r} is no state of a recording; {did_you_mean(state, _ORDER)}")
         with self._database.write() as connection:
             if state is not None:
-                revision.grow(connection)
+                grow_revision(connection)
             return _move(connection, id, state, facts)
 
     def get(self, id: str) -> RecordingRecord:

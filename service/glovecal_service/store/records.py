@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 from glovecal_models.calibration.training_settings import OF_SHAPES
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import HANDS, Handedness, is_of_hand, known_hand
+from glovecal_models.hand.rotations import HANDS, Handedness, is_of_hand, known_hand
 from glovecal_models.hand.skeleton import Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
-from glovecal_models.takes.known_latency import KnownLatency
 from glovecal_models.takes.session_drift import shape_of
+from glovecal_models.takes.take import KnownLatency
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -191,6 +191,10 @@ def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:
     return [sentence for sentence in each if sentence]
 
 
+REMOVED, NAME, NOTE = "removed_at", "name", "note"
+"""Facts that people give a model."""
+
+
 @dataclass(frozen=True)
 class ModelRecord:
     """A calibration model: immutable; ``id`` is the sha256 of its artifact."""
@@ -205,6 +209,10 @@ class ModelRecord:
     created_at: datetime
     hand: Handedness | None = None
     """That of its takes; None where nobody said it, and it reads both hands' gloves."""
+
+    @property
+    def is_removed(self) -> bool:
+        return bool(self.facts.get(REMOVED))
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from sqlalchemy import ColumnElement, Connection, Row, Select, Table, insert, se
 from sqlalchemy.types import Float
 
 from glovecal_models.errors import BadInput
-from glovecal_service.store.column_types import Json, JsonText, Unreadable, UtcTime
 from glovecal_service.store.errors import DamagedRows, StoreDamaged
-from glovecal_service.store.json_text import json_text
+from glovecal_service.store.tables import Json, JsonText, Unreadable, UtcTime
+from glovecal_service.store.texts import json_text
 
 HASH = "row_sha256"
 Record = TypeVar("Record")

@@ -11,9 +11,8 @@ from typing import Any
 
 from sqlalchemy import Connection, select
 
-from glovecal_service.store import revision, tables
-from glovecal_service.store.clock import new_id, now
-from glovecal_service.store.database import Database
+from glovecal_service.store import tables
+from glovecal_service.store.database import Database, grow_revision, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
@@ -58,7 +57,7 @@ class Samplings:
                 "updated_at": at,
             }
             add_row(connection, table, values)
-            revision.grow(connection)
+            grow_revision(connection)
             return _require(connection, id)
 
     def get(self, id: str) -> SamplingRecord:
@@ -85,7 +84,7 @@ class Samplings:
         with self._database.write() as connection:
             if not change_rows(connection, table, same, values):
                 return None
-            revision.grow(connection)
+            grow_revision(connection)
             return _require(connection, seen.id)
 
     def note(self, id: str, **values: Any) -> None:

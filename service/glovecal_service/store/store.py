@@ -10,16 +10,14 @@ from types import TracebackType
 
 from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
-from glovecal_service.store.artifacts import Artifacts
-from glovecal_service.store.blobs import FolderBlobs, ObjectBlobs, full_disk_named
+from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
 from glovecal_service.store.data_folder_lock import LOCK, WHO
-from glovecal_service.store.database import Database
+from glovecal_service.store.database import Database, Revision
 from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.jobs import Jobs
 from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
 from glovecal_service.store.recordings import Recordings
-from glovecal_service.store.revision import Revision
 from glovecal_service.store.samplings import Samplings
 from glovecal_service.store.schema import upgrade
 from glovecal_service.store.subjects import Subjects

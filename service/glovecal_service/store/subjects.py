@@ -11,11 +11,10 @@ from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.names import check_identifier, did_you_mean
-from glovecal_service.store import revision, tables
-from glovecal_service.store.clock import now
-from glovecal_service.store.database import Database
+from glovecal_service.store import tables
+from glovecal_service.store.database import Database, grow_revision, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SubjectRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
@@ -87,7 +86,7 @@ class Subjects:
             worn = update(tables.gloves).where(tables.gloves.c.subject == name)
             connection.execute(worn.values(subject=None, wearing=None))
             connection.execute(delete(tables.subjects).where(tables.subjects.c.name == name))
-            revision.grow(connection)
+            grow_revision(connection)
 
 
 def require_subject(connection: Connection, name: str) -> SubjectRecord:

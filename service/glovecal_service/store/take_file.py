@@ -1,18 +1,26 @@
-"""A take as one file: safetensors for the arrays, JSON in its metadata for the rest."""
+"""A take as one file (safetensors, JSON in its metadata), and the preview of a video filmed beside it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
-from glovecal_models.errors import DamagedArtifact
+from glovecal_client.operating_system import move_over
+from glovecal_client.pictures.video_file import ABOUT, MOST_PICTURES, picture_name
+from glovecal_models.documents import UNREADABLE_ARCHIVE, read_json
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.takes.take import Take
+from glovecal_service.store.errors import NotFound
 
 VERSION = 1
 
@@ -88,3 +96,112 @@ def frames_hash(take: Take) -> str:
 def _description(content: bytes) -> dict[str, Any]:
     header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
     return json.loads(header["__metadata__"]["glovecal.take"])
+
+
+LARGEST_PICTURE = 1_000_000
+LARGEST_ABOUT = 2_000_000
+MADE_BY = "one is made by glovecal record GLOVE NAME --video SOURCE"
+JPEG_BEGINS = b"\xff\xd8\xff"
+Line = Annotated[str, Field(max_length=300)]
+
+
+class VideoFacts(BaseModel):
+    """What a preview is of."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    source: Line
+    simulated: bool = Field(description="Its pictures were drawn, not taken.")
+    computer: Annotated[str, Field(max_length=64)]
+    times_s: Annotated[list[FiniteFloat], Field(min_length=1, max_length=MOST_PICTURES)] = Field(
+        description="Of each picture, seconds of the computer's monotonic clock: the clock of its takes."
+    )
+
+
+class Videos:
+    """The folder ``videos`` of the data folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def attach(self, take: str, preview: Path) -> VideoFacts:
+        """Keep ``preview`` for a take's id, in place of an earlier one. Raises BadInput."""
+        facts = check_preview(preview)
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        partial = self._path(take).with_suffix(".partial")
+        shutil.copyfile(preview, partial)
+        move_over(partial, self._path(take))
+        return facts
+
+    def takes(self) -> list[str]:
+        """Ids of takes that have a video."""
+        return sorted(path.stem for path in self._folder.glob("*.zip"))
+
+    def facts(self, take: str) -> VideoFacts:
+        """Raises NotFound, BadInput for a file that was damaged since."""
+        return _facts(self._found(take))
+
+    def picture(self, take: str, number: int) -> bytes:
+        """One JPEG picture. Raises NotFound, BadInput."""
+        try:
+            with zipfile.ZipFile(self._found(take)) as file:
+                return file.read(picture_name(number))
+        except KeyError as error:
+            raise NotFound(f"the video of take {take} has no picture {number}") from error
+        except UNREADABLE_ARCHIVE as error:
+            raise BadInput(f"the video of take {take} is damaged; attach it again") from error
+
+    def _found(self, take: str) -> Path:
+        path = self._path(take)
+        if not path.is_file():
+            raise NotFound(f"take {take} has no video; glovecal take video attaches one")
+        return path
+
+    def _path(self, take: str) -> Path:
+        return self._folder / f"{take}.zip"
+
+
+def check_preview(path: Path) -> VideoFacts:
+    """Every entry of the file. Raises BadInput that says what is wrong."""
+    facts = _facts(path)
+    if not (np.diff(facts.times_s) > 0).all():
+        raise BadInput("times_s of the video's pictures must increase")
+    with zipfile.ZipFile(path) as file:
+        wanted = {picture_name(number) for number in range(len(facts.times_s))} | {ABOUT}
+        entries = {entry.filename: entry for entry in file.infolist()}
+        if set(entries) != wanted or len(entries) != len(file.infolist()):
+            raise BadInput(f"the video must hold {ABOUT} and {len(wanted) - 1} pictures, one a time")
+        for name, entry in entries.items():
+            if entry.compress_type != zipfile.ZIP_STORED:
+                raise BadInput(f"{name} in the video is compressed; pictures are stored as they are")
+            if name == ABOUT:
+                continue
+            if entry.file_size > LARGEST_PICTURE:
+                raise BadInput(f"{name} has {entry.file_size} bytes; at most {LARGEST_PICTURE}")
+            try:
+                begins = file.open(entry).read(len(JPEG_BEGINS))
+            except UNREADABLE_ARCHIVE as error:
+                raise BadInput(
+                    f"{name} in the video cannot be read: it is encrypted or damaged; {MADE_BY}"
+                ) from error
+            if begins != JPEG_BEGINS:
+                raise BadInput(f"{name} in the video is no JPEG picture")
+    return facts
+
+
+def _facts(path: Path) -> VideoFacts:
+    try:
+        with zipfile.ZipFile(path) as file:
+            entry = file.getinfo(ABOUT)
+            if entry.file_size > LARGEST_ABOUT:
+                raise BadInput(f"{ABOUT} has {entry.file_size} bytes; at most {LARGEST_ABOUT}")
+            return VideoFacts.model_validate(read_json(file.read(entry), f"{ABOUT} of the video"))
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors()[0]["loc"]))
+        raise BadInput(f"{ABOUT} of the video: {where} is not what it should be; {MADE_BY}") from error
+    except BadInput:
+        raise
+    except UNREADABLE_ARCHIVE as error:
+        raise BadInput(
+            f"no preview of a video: the file is no zip file with {ABOUT}, encrypted or damaged; {MADE_BY}"
+        ) from error

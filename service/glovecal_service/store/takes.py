@@ -7,22 +7,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, delete, select
+from sqlalchemy import Connection, Select, delete, select
 from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
-from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES
+from glovecal_models.takes.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.reference_jumps import without_jumps
 from glovecal_models.takes.take import Take, poses_at_frames
 from glovecal_service.store import tables
-from glovecal_service.store.artifacts import Artifacts, check_sha256
-from glovecal_service.store.clock import new_id, now
-from glovecal_service.store.database import Database
+from glovecal_service.store.blobs import Artifacts, check_sha256
+from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.gloves import latency_of_take
+from glovecal_service.store.list_part import WHOLE, ListPart
 from glovecal_service.store.records import CLOCK_UNKNOWN, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
@@ -39,6 +39,10 @@ and the range of each rotation that it saw; None where another reference came af
 
 UNWRAPPED = "unwrapped"
 """Fact of a take: sentences on angles of its reference that are counted past a full turn."""
+
+_SEARCHED = (
+    "^id", "name", "subject", "wearing", "layout", "source", "^original_sha256", "^facts.read_as.shape",
+)  # fmt: skip
 
 
 class Takes:
@@ -77,6 +81,7 @@ class Takes:
         layout: str,
         source: str,
         original_sha256: str | None = None,
+        facts: Mapping[str, Any] | None = None,
     ) -> list[TakeRecord]:
         """Keep the takes of one file in their order, all in one transaction or none.
 
@@ -87,7 +92,7 @@ class Takes:
         """
         return self._keep(
             takes, subject, layout=layout, source=source, original_sha256=original_sha256,
-            accounting=None, recording=None,
+            accounting=None, recording=None, facts=dict(facts or {}),
         )  # fmt: skip
 
     def _keep(self, takes: Sequence[Take], subject: str, **shared: Any) -> list[TakeRecord]:
@@ -115,14 +120,19 @@ class Takes:
         with self._database.read() as connection:
             return _require(connection, id)
 
-    def list(self, subject: str | None = None, layout: str | None = None) -> list[TakeRecord]:
+    def list(
+        self, subject: str | None = None, layout: str | None = None, part: ListPart = WHOLE
+    ) -> list[TakeRecord]:
         """Takes in the order they were added."""
-        statement = select(tables.takes).order_by(tables.takes.c.created_at, tables.takes.c.id)
-        if subject is not None:
-            statement = statement.where(of_subject(tables.takes, subject))
+        chosen = part.of(_chosen(subject), tables.takes, _SEARCHED, newest_first=False)
         with self._database.read() as connection:
             wanted = {"subject": subject, "layout": layout}
-            return sound_rows(connection, tables.takes, statement, _record, wanted)
+            return sound_rows(connection, tables.takes, chosen, _record, wanted)
+
+    def count(self, subject: str | None = None, part: ListPart = WHOLE) -> int:
+        """How many there are of a subject (None: of all) that hold the text of ``part``."""
+        with self._database.read() as connection:
+            return part.count(connection, _chosen(subject), tables.takes, _SEARCHED)
 
     def load(self, id: str) -> Take:
         """The take as it is worked with: ``load_recorded`` without angles that jump away and come back.
@@ -328,6 +338,11 @@ def _of_another_reference(record: TakeRecord) -> dict[str, Any]:
     """What a take's facts say of a reference that is not known of the next one."""
     unknown = {CLOCK_OFFSET: 0.0, CLOCK_UNKNOWN: False, CAMERA_REFERENCE: None, UNWRAPPED: []}
     return {name: unknown[name] for name in unknown if name in record.facts}
+
+
+def _chosen(subject: str | None) -> Select[Any]:
+    every = select(tables.takes)
+    return every if subject is None else every.where(of_subject(tables.takes, subject))
 
 
 def _require(connection: Connection, id: str) -> TakeRecord:

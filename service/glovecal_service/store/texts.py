@@ -1,8 +1,10 @@
-"""Free text that people give (titles, take names, wearings): bounded, one line, storable everywhere."""
+"""What people and programs give as text: free text on one line, JSON of the standard; else BadInput."""
 
 from __future__ import annotations
 
+import json
 import unicodedata
+from typing import Any
 
 from glovecal_models.errors import BadInput
 
@@ -21,3 +23,14 @@ def check_text(text: str, what: str, *, empty: bool = False) -> str:
         if unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp"):
             raise BadInput(f"{what} holds the character U+{ord(character):04X}, which is not text")
     return text
+
+
+def json_text(value: Any, *, sort_keys: bool = False) -> str:
+    """Compact ASCII JSON. Raises BadInput for NaN, infinity and what JSON has no form for."""
+    try:
+        return json.dumps(value, allow_nan=False, sort_keys=sort_keys, separators=(",", ":"))
+    except (ValueError, TypeError, RecursionError) as error:
+        raise BadInput(
+            "a value cannot be stored: it is not finite, nested too deeply or no JSON; give plain text, "
+            "finite numbers, lists and objects"
+        ) from error

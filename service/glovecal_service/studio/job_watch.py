@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
+from collections.abc import Awaitable, Callable
 
 from nicegui import ui
 
-from glovecal_service.studio.service import Refusal
+from glovecal_service.rest.job.answer import Job
+from glovecal_service.studio.heading import quiet_act
+from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
@@ -16,7 +17,7 @@ EVERY_S = 0.5
 class JobWatch:
     """One bar on a page, hidden while no job is followed. A page that is closed leaves its job running."""
 
-    def __init__(self, studio: Studio, finished: Callable[[Mapping[str, Any]], Awaitable[None]]) -> None:
+    def __init__(self, studio: Studio, finished: Callable[[Job], Awaitable[None]]) -> None:
         self._studio = studio
         self._finished = finished
         self._job = ""
@@ -24,7 +25,7 @@ class JobWatch:
         with self._row:
             self._sentence = ui.label("").props('role="status"')
             self._bar = ui.linear_progress(0.0, show_value=False).props('aria-label="progress"')
-            ui.button("Cancel", on_click=self._cancel).props("flat no-caps").classes("studio-target")
+            quiet_act("Cancel", self._cancel)
         self._row.set_visibility(False)
         self._timer = ui.timer(EVERY_S, self._look, active=False)
 
@@ -37,15 +38,15 @@ class JobWatch:
 
     async def _look(self) -> None:
         try:
-            job = await self._studio.service.get(f"/jobs/{self._job}")
+            job = await self._studio.service.read(Job, f"/jobs/{self._job}")
         except Refusal as refusal:
             self._end(str(refusal))
             return
-        self._bar.set_value(job["fraction"])
-        self._sentence.set_text(f"{100 * job['fraction']:.0f} %  {job['sentence']}")
-        if job["finished_at"] is None:
+        self._bar.set_value(job.fraction)
+        self._sentence.set_text(f"{100 * job.fraction:.0f} %  {job.sentence}")
+        if job.finished_at is None:
             return
-        self._end("" if job["state"] == "done" else job["error"] or f"{job['kind']}: {job['state']}")
+        self._end("" if job.state == "done" else job.error or f"{job.kind}: {job.state}")
         await self._finished(job)
 
     def _end(self, problem: str) -> None:
@@ -55,7 +56,5 @@ class JobWatch:
             ui.notify(problem, type="warning", timeout=10_000)
 
     async def _cancel(self) -> None:
-        try:
+        with refusals():
             await self._studio.service.post(f"/jobs/{self._job}/cancel")
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")

@@ -15,11 +15,9 @@ import numpy as np
 import zenoh
 
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused, WireError
-from glovecal_client.keys import GloveKeys, all_gloves, all_services, parse_glove_key
-from glovecal_client.names import check_channel_name
+from glovecal_client.keys import GloveKeys, all_gloves, all_services, check_channel_name, parse_glove_key
 from glovecal_client.pose_subscriber import PoseSubscriber
-from glovecal_client.queries import ask_json, json_object
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, json_object, open_client
 from glovecal_client.wire.frame import decode_frame
 from glovecal_client.wire.pose import Pose
 from glovecal_service.settings import Settings
@@ -74,7 +72,7 @@ class GloveFeed:
 
     def array(self, pose: Pose) -> bytes:
         """Float32: R, S, R angles and R standard deviations (degrees), S readings (counts)."""
-        raw = self._readings()
+        raw = self.readings()
         head = np.array([len(pose.degrees), len(raw)])
         return np.concatenate((head, pose.degrees, pose.deviations, raw)).astype("<f4").tobytes()
 
@@ -83,7 +81,8 @@ class GloveFeed:
         for subscriber in self._subscribers:
             subscriber.undeclare()
 
-    def _readings(self) -> np.ndarray:
+    def readings(self) -> np.ndarray:
+        """The newest, in counts, shape (S,); empty before the first."""
         message = self._raw
         if message is not None:
             with suppress(WireError):

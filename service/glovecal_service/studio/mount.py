@@ -25,7 +25,20 @@ from starlette.websockets import WebSocketDisconnect
 from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
 from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
-from glovecal_service.studio.pages import cameras, capture, compare, diagnose, effects, fall, live, models
+from glovecal_service.studio.pages import (
+    cameras,
+    capture,
+    compare,
+    diagnose,
+    effects,
+    fall,
+    jobs,
+    live,
+    models,
+    start,
+    take,
+    takes,
+)
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.studio import Studio
 
@@ -33,7 +46,9 @@ _log = logging.getLogger("glovecal.studio")
 
 PATH = "/studio"
 FRAME_S = 1.0 / 30.0
-PAGES = (live, capture, cameras, compare, diagnose, fall, models, effects)
+RECONNECT_S = 30.0
+"""A page that does not answer for so long, in a computer that sleeps or is busy, starts anew."""
+PAGES = (start, live, capture, cameras, takes, take, compare, diagnose, fall, models, effects, jobs)
 
 
 def mount_studio(app: FastAPI, settings: Settings) -> None:
@@ -47,7 +62,7 @@ def mount_studio(app: FastAPI, settings: Settings) -> None:
         page.add(studio)
     ui.run_with(
         app, mount_path=PATH, title="Glovecal", dark=None, show_welcome_message=False, language="en-US",
-        tailwind=False, reconnect_timeout=10.0,
+        tailwind=False, reconnect_timeout=RECONNECT_S,
     )  # fmt: skip
     _close_with(app, studio)
 

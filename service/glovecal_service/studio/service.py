@@ -5,15 +5,20 @@ Whatever a page shows, a script can ask for; every check and refusal of REST hol
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, TypeVar
 
 import httpx
 from fastapi import FastAPI
+from nicegui import ui
 
+from glovecal_service.plain import TOTAL, read
 from glovecal_service.rest.http.observation import STUDIO
 
 PATIENCE_S = 300.0
+Found = TypeVar("Found")
 
 
 class Refusal(Exception):
@@ -22,6 +27,19 @@ class Refusal(Exception):
     def __init__(self, status: int, sentence: str) -> None:
         super().__init__(sentence)
         self.status = status
+
+
+warn = partial(ui.notify, type="warning")
+warn_long = partial(warn, timeout=10_000)
+
+
+@contextmanager
+def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
+    """What the service refuses inside is told, and the rest of the block is not done."""
+    try:
+        yield
+    except Refusal as refusal:
+        tell(str(refusal))
 
 
 class Service:
@@ -34,10 +52,23 @@ class Service:
         )
 
     async def get(self, path: str, **query: Any) -> Any:
-        return await self._ask("GET", path, query, None)
+        return await self._ask("GET", path, query)
+
+    async def part(self, answer: type[Found], path: str, **query: Any) -> tuple[list[Found], int]:
+        """Rows of a list, and how many there are in all."""
+        found = await self._answer("GET", path, query)
+        return read(list[answer], found.json()), int(found.headers[TOTAL])
+
+    async def read(self, answer: type[Found], path: str, **query: Any) -> Found:
+        """What ``get`` answers, as what it is."""
+        return read(answer, await self.get(path, **query))
 
     async def post(self, path: str, body: Mapping[str, Any] | None = None, **query: Any) -> Any:
         return await self._ask("POST", path, query, body or {})
+
+    async def ask(self, answer: type[Found], path: str, body: Mapping[str, Any] | None = None) -> Found:
+        """What ``post`` answers, as what it is."""
+        return read(answer, await self.post(path, body))
 
     async def put(self, path: str, body: Mapping[str, Any], **query: Any) -> Any:
         return await self._ask("PUT", path, query, body)
@@ -54,22 +85,27 @@ class Service:
     async def close(self) -> None:
         await self._http.aclose()
 
-    async def _ask(
+    async def _ask(self, *request: Any) -> Any:
+        answer = await self._answer(*request)
+        return answer.json() if answer.content else None
+
+    async def _answer(
         self,
         method: str,
         path: str,
         query: Mapping[str, Any],
-        body: Mapping[str, Any] | None,
+        body: Mapping[str, Any] | None = None,
         content: bytes | None = None,
         media_type: str = "",
-    ) -> Any:
+    ) -> httpx.Response:
+        """Raises Refusal."""
         given = {name: value for name, value in query.items() if value is not None}
         headers = {"Content-Type": media_type} if media_type else {}
         answer = await self._http.request(
             method, path, params=given, json=body, content=content, headers=headers
         )
         if answer.is_success:
-            return answer.json() if answer.content else None
+            return answer
         try:
             problem = answer.json()
         except ValueError:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Refusal
+from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.model.answer import Model
+from glovecal_service.studio.chosen import Chosen, chosen
+from glovecal_service.studio.drop import DropZone
+from glovecal_service.studio.heading import heading, quiet_act
+from glovecal_service.studio.next_steps import next_steps
+from glovecal_service.studio.service import Refusal, Service, refusals
 from glovecal_service.studio.studio import Studio
 
 NAVIGATION = (
+    ("start", "Start"),
     ("live", "Live"),
     ("capture", "Capture"),
     ("cameras", "Cameras"),
+    ("takes", "Takes"),
     ("compare", "Compare"),
     ("diagnose", "Diagnose"),
     ("fall", "Error fall"),
@@ -33,24 +40,51 @@ page = partial(ui.page, response_timeout=PATIENCE_S)
 """Registers the page of an address below ``/studio``."""
 
 
-@contextmanager
-def shell(studio: Studio, here: str, title: str) -> Iterator[None]:
-    """A page: what stands in the ``with`` block is its main part."""
+@dataclass(frozen=True)
+class Around:
+    """What a page has around it."""
+
+    drop: DropZone
+    chosen: Chosen
+
+    async def model(self, service: Service) -> Model | None:
+        """The one that is chosen; where there is none, what to do next is shown."""
+        if self.chosen.model is None:
+            whose = f" of {self.chosen.person}" if self.chosen.person else ""
+            ui.label(f"No model{whose} yet.").classes("studio-notice")
+            await next_steps(service)
+        return self.chosen.model
+
+
+@asynccontextmanager
+async def shell(
+    studio: Studio, here: str, title: str, *, about_models: bool = False
+) -> AsyncIterator[Around]:
+    """A page: what stands in the ``with`` block is its main part; files dropped on it are looked at.
+
+    ``about_models``: whether its header offers the person's models, not only persons.
+    """
+    about = await chosen(studio.service)
     ui.add_head_html('<link rel="stylesheet" href="/studio/static/studio.css">')
-    ui.page_title(f"{title} – Glovecal")
+    for script in ("words", "tables"):
+        ui.add_head_html(f'<script type="module" src="/studio/static/{script}.js"></script>')
+    ui.page_title(" – ".join(filter(None, (about.person, title, "Glovecal"))))
     with ui.header(elevated=False).classes("studio-header"):
         ui.link("Skip to content", "#main").classes("studio-skip")
         ui.label("Glovecal").classes("studio-name")
         with ui.element("nav").props('aria-label="Pages"').classes("studio-nav"):
             for address, name in NAVIGATION:
-                link = ui.link(name, f"/{address}").classes("studio-link")
+                link = ui.link(name, about.address(address)).classes("studio-link")
                 if address == here:
                     link.props('aria-current="page"')
         ui.space()
+        about.selects(here, about_models=about_models)
         drawer = JobsDrawer(studio)
     with ui.element("div").props('id="main" tabindex="-1"').classes("studio-main"):
         heading(1, title)
-        yield
+        if about.notice:
+            ui.label(about.notice).classes("studio-notice").props('role="status"')
+        yield Around(DropZone(studio), about)
     drawer.start()
 
 
@@ -59,22 +93,22 @@ def shell(studio: Studio, here: str, title: str) -> Iterator[None]:
 
 EVERY_S = 1.0
 SHOWN = 12
-WITH_REPORTS = ("improve", "detectability")
+WITH_REPORTS = ("improve", "detectability", "calibration-report")
 PAGES = {"diagnose": ("diagnose?model=", "What it found"), "ceiling": ("compare?models=", "Compare")}
 """Where a job's model is shown with its result; of other kinds its errors are."""
 
 
-def result_link(job: Mapping[str, Any]) -> tuple[str, str] | None:
+def result_link(job: Job) -> tuple[str, str] | None:
     """Name and address of the page that shows what a finished job found; None where there is none."""
-    result = job["result"]
+    result = job.result
     if not result:
         return None
-    if job["kind"] in WITH_REPORTS:
-        return "Report", f"../v1/jobs/{job['id']}/report"
+    if job.kind in WITH_REPORTS:
+        return "Report", f"../v1/jobs/{job.id}/report"
     model = result.get("model")
     if not model:
         return None
-    page, name = PAGES.get(job["kind"], ("fall?model=", "Its errors"))
+    page, name = PAGES.get(job.kind, ("fall?model=", "Its errors"))
     return name, f"/{page}{quote(str(model))}"
 
 
@@ -95,7 +129,8 @@ class JobsDrawer:
         ):
             heading(2, "Jobs")
             self._list = ui.column().classes("jobs-list")
-            ui.button("Close", on_click=self._dialog.close).props("flat no-caps").classes("studio-target")
+            ui.link("All jobs", "/jobs").classes("studio-link")
+            quiet_act("Close", self._dialog.close)
 
     def start(self) -> None:
         ui.timer(EVERY_S, self._look)
@@ -103,17 +138,17 @@ class JobsDrawer:
     async def _look(self) -> None:
         service = self._studio.service
         try:
-            running = await service.get("/jobs", only_unfinished=True)
-            now = {job["id"]: (job["state"], job["fraction"], job["sentence"]) for job in running}
+            running = await service.read(list[Job], "/jobs", only_unfinished=True)
+            now = {job.id: (job.state, job.fraction, job.sentence) for job in running}
             if now == self._running:
                 return
-            jobs = (await service.get("/jobs"))[:SHOWN]
+            jobs = await service.read(list[Job], "/jobs", limit=SHOWN)
         except Refusal:
             return
         self._button.set_text(f"Jobs ({len(now)} running)" if now else "Jobs")
         for job in jobs:
-            if self._running is not None and job["id"] in self._running and job["id"] not in now:
-                ui.notify(f"{job['kind']}: {job['state']}", position="bottom-right")
+            if self._running is not None and job.id in self._running and job.id not in now:
+                ui.notify(f"{job.kind}: {job.state}", position="bottom-right")
         self._running = now
         self._list.clear()
         with self._list:
@@ -122,23 +157,20 @@ class JobsDrawer:
             if not jobs:
                 ui.label("No job yet.")
 
-    def _row(self, job: dict[str, Any]) -> None:
+    def _row(self, job: Job) -> None:
         with ui.element("section").classes("job"):
-            ui.label(f"{job['kind']}: {job['state']}").classes("job-kind")
-            if job["finished_at"] is None:
-                share = job["fraction"]
-                ui.linear_progress(share, show_value=False).props(f'aria-label="{job["kind"]}"')
-                ui.button("Cancel", on_click=lambda: self._cancel(job["id"])).props("flat no-caps").classes(
-                    "studio-target"
-                )
-            ui.label(job["sentence"]).classes("job-sentence")
-            found = result_link(job)
-            if found is not None:
-                name, address = found
+            about = f" of {job.subject}" if job.subject else ""
+            ui.label(f"{job.kind}{about}: {job.state}").classes("job-kind")
+            if job.finished_at is None:
+                share = job.fraction
+                ui.linear_progress(share, show_value=False).props(f'aria-label="{job.kind}"')
+                quiet_act("Cancel", lambda: self._cancel(job.id))
+            ui.label(job.sentence).classes("job-sentence")
+            link = result_link(job)
+            if link is not None:
+                name, address = link
                 ui.link(name, address).classes("studio-link")
 
     async def _cancel(self, job: str) -> None:
-        try:
+        with refusals():
             await self._studio.service.post(f"/jobs/{job}/cancel")
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from nicegui import ui
@@ -39,3 +39,15 @@ def text_row(head: str, *cells: str) -> ui.element:
         for text in cells:
             cell(text)
     return row
+
+
+def fact_list(facts: Mapping[str, str]) -> dict[str, ui.label]:
+    """A number beside each name, and a title that tells what it is; the numbers' labels by name."""
+    labels = {}
+    with ui.element("ul").classes("glove-facts"):
+        for name, what in facts.items():
+            with ui.element("li") as item:
+                item.props["title"] = what
+                ui.label(name).classes("glove-fact")
+                labels[name] = ui.label("–").classes("glove-number")
+    return labels

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.rotations import Handedness
 
 MOST_CHARACTERS = 1 << 20
 """Of a file; the longest of these formats has a few thousand."""

@@ -13,6 +13,7 @@ from glovecal_models.calibration.text import plan_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.diagnosis.residual_answer import NextTake
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.active.known_readings import (
@@ -23,22 +24,18 @@ from glovecal_models.sampling.active.known_readings import (
 from glovecal_models.sampling.active.next_step import (
     NextStep,
     candidate_steps,
-    diagnosed_take,
     propose_for_model,
     register_candidates,
     still_possible,
 )
 from glovecal_models.sampling.active.proposal import propose
 from glovecal_models.sampling.catalogue import Equipment, make_protocol
-from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.engine import NotNow, Sampling, begin_sampling
 from glovecal_models.sampling.limits import SAMPLING_LIMITS
-from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import Attempt, NextSteps, SamplingState
-from glovecal_models.sampling.user_events import NotNow
+from glovecal_models.sampling.state import Attempt, GloveReading, NextSteps, SamplingState
 from glovecal_models.simulation.protocol import free_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.take import Take
 
 LAYOUT = Layout.built_in("cyberglove18")
@@ -279,8 +276,5 @@ def test_a_sampling_stopped_early_trains_what_it_can() -> None:
 
 
 def test_a_diagnosis_asks_for_its_own_take() -> None:
-    wanted = {"what": "Swing fast.", "seconds": 25, "separates": ["lag", "clock_offset"]}
-    told = diagnosed_take({"next_take": wanted})
-    assert told is not None
-    assert told["reason"].startswith("The diagnosis cannot tell lag and clock offset apart")
-    assert diagnosed_take({"next_take": None}) is None
+    wanted = NextTake("fast", "Swing fast.", 25, ("lag", "clock_offset"), "fast")
+    assert wanted.reason.startswith("The diagnosis cannot tell lag and clock offset apart")

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.layout import Layout
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.sampling.active.assumed_process import (
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.sampling.active.proposal import (
     AssumedProcess,
     PosteriorVariance,
     SampledPoints,

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.calibration.added_effect import EffectRequest
 from glovecal_models.calibration.effect_fit import fit_with_effects
-from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.folds import alone_in_their_motion
-from glovecal_models.calibration.held_out_check import _cut, frame_errors_of, held_out_errors
+from glovecal_models.calibration.leave_out import _cut, frame_errors_of, held_out_errors
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.catalogue import effect

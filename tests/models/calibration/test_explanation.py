@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.calibration.added_effect import AddedEffect
-from glovecal_models.calibration.explanation import AngleTerms, FrameExplainer, explain
+from glovecal_models.calibration.answer import AngleTerms
+from glovecal_models.calibration.explanation import FrameExplainer, explain
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import FAULTY_SENSOR, LEAST_VARIANCE, GlovePredictor
-from glovecal_models.calibration.text import angle_sentences, frame_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.catalogue import stored_effect
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
@@ -88,12 +88,14 @@ def model_with(names: tuple[str, ...], seed: int, *, extra: bool = True) -> Cali
     for name in names:
         shape, constants = CHOICES[name]
         on = tuple(generator.permutation(MEASURED)[:2].tolist())
-        weights = generator.normal(0, 1.5, (2, len(stored_effect(name, constants).weight_names(constants))))
+        weights = generator.normal(
+            0, 1.5, (2, len(stored_correction(name, constants).weights(constants).names))
+        )
         grid = np.tile(np.array(shape, dtype=float), (2, 1))
         effects.append(AddedEffect(name, on, constants, grid, weights, np.zeros(2)))
     for name, constants in WITHOUT_COLUMNS if extra else ():
         nothing = np.empty((3, 0))
-        shape = np.zeros((3, len(stored_effect(name, constants).parameters)))
+        shape = np.zeros((3, 0))
         effects.append(AddedEffect(name, MEASURED, constants, shape, nothing, np.zeros(3)))
     return replace(BASE, effects=tuple(effects))
 
@@ -114,7 +116,9 @@ def recorded(seed: int, wearing: str) -> Take:
 def is_whole(angle: AngleTerms) -> None:
     """Degrees add up to the angle, claimed variances to the claimed one."""
     assert abs(sum(item.degrees for item in angle.terms) - angle.degrees) < 1e-9
-    claimed = sum(item.variance for item in angle.terms if item.is_claimed and item.variance is not None)
+    claimed = sum(
+        item.variance_deg2 for item in angle.terms if item.is_claimed and item.variance_deg2 is not None
+    )
     assert abs(max(claimed, LEAST_VARIANCE) - angle.sd_deg**2) < 1e-9
 
 
@@ -132,8 +136,8 @@ def test_terms_add_up_to_what_is_served(
     model, take = model_with(tuple(names), seed, extra=extra), recorded(seed, wearing)
     served = GlovePredictor(model).predict_take(take.time_s, take.readings, take.context, wearing)
     found = explain(model, take, float(take.time_s[frame]) + 1e-4)
-    assert found.number == frame
-    for at, angle in enumerate(found.frame.angles):
+    assert found.frame == frame
+    for at, angle in enumerate(found.rotations):
         is_whole(angle)
         assert abs(angle.degrees - served.mean[frame, at]) < 1e-9
         assert abs(angle.sd_deg - served.sd[frame, at]) < 1e-9
@@ -150,20 +154,20 @@ def test_frame_by_frame_gives_the_terms_of_the_take(seed: int) -> None:
         said = live.frame(float(take.time_s[number]), take.readings[number], context, take.wearing)
         if number not in (0, 50, 99, 100, 184, 189, 190, FRAMES - 1):
             continue
-        of_take = explain(model, take, float(take.time_s[number])).frame
-        assert said.faulty_sensors == of_take.faulty_sensors
+        of_take = explain(model, take, float(take.time_s[number]))
+        assert list(said.faulty_sensors) == list(of_take.faulty_sensors)
         assert said.transient_s == pytest.approx(of_take.transient_s)
         assert said.silent == of_take.silent
-        for one, other in zip(said.angles, of_take.angles, strict=True):
+        for one, other in zip(said.rotations, of_take.rotations, strict=True):
             is_whole(one)
             assert [item.name for item in one.terms] == [item.name for item in other.terms]
             for mine, its in zip(one.terms, other.terms, strict=True):
                 assert abs(mine.degrees - its.degrees) < 1e-9
-                assert mine.variance == pytest.approx(its.variance, abs=1e-9)
+                assert mine.variance_deg2 == pytest.approx(its.variance_deg2, abs=1e-9)
 
 
 def angle_of(model: CalibrationModel, take: Take, frame: int, rotation: str) -> AngleTerms:
-    found = explain(model, take, float(take.time_s[frame])).frame.angles
+    found = explain(model, take, float(take.time_s[frame])).rotations
     return next(item for item in found if item.rotation == rotation)
 
 
@@ -174,7 +178,7 @@ def test_terms_are_in_the_order_in_which_they_are_applied() -> None:
     assert [item.name for item in angle.terms] == ["base", "creep", "lag", "measurement noise"]
     assert [item.sd_deg is None for item in angle.terms] == [False, True, True, False]
     assert angle.readings == {"I_PIP": pytest.approx(recorded(4, "monday").readings[90, 1])}
-    assert "Not stored: the model has no standard deviation of this term." in angle_sentences(angle, None)
+    assert "Not stored: the model has no standard deviation of this term." in angle.sentences
 
 
 def test_a_rule_has_the_terms_of_what_it_follows() -> None:
@@ -190,24 +194,22 @@ def test_a_rule_has_the_terms_of_what_it_follows() -> None:
 def test_a_faulty_sensor_is_a_term_and_a_word() -> None:
     model, take = model_with(("creep",), 6), recorded(6, "monday")
     found = explain(model, take, float(take.time_s[185]))
-    assert found.frame.faulty_sensors == ("I_MCP",)
-    angle = next(item for item in found.frame.angles if item.rotation == "I_MCP")
+    assert found.faulty_sensors == ("I_MCP",)
+    angle = next(item for item in found.rotations if item.rotation == "I_MCP")
     held = next(item for item in angle.terms if item.kind == "held")
     assert abs(held.degrees) > 5.0
     assert held.sd_deg is not None
     assert angle.flags & FAULTY_SENSOR
-    assert any(sentence.startswith("Held:") for sentence in angle_sentences(angle, None))
-    assert any(sentence.startswith("Faulty sensor: I_MCP") for sentence in frame_sentences(found.frame))
+    assert any(sentence.startswith("Held:") for sentence in angle.sentences)
+    assert any(sentence.startswith("Faulty sensor: I_MCP") for sentence in found.sentences)
 
 
 def test_a_transient_is_said_until_it_is_over() -> None:
     model, take = model_with(("creep",), 7), recorded(7, "monday")
-    after_pause = explain(model, take, float(take.time_s[110])).frame
+    after_pause = explain(model, take, float(take.time_s[110]))
     assert after_pause.transient_s == pytest.approx(take.time_s[110] - take.time_s[100])
-    assert any(
-        sentence.startswith("Transient: creep began anew") for sentence in frame_sentences(after_pause)
-    )
-    instant = explain(model_with(("cross_coupling",), 7), take, float(take.time_s[0])).frame
+    assert any(sentence.startswith("Transient: creep began anew") for sentence in after_pause.sentences)
+    instant = explain(model_with(("cross_coupling",), 7), take, float(take.time_s[0]))
     assert instant.transient_s is None
 
 
@@ -220,7 +222,7 @@ def test_a_wearing_that_nobody_knows_is_said_and_has_a_standard_deviation() -> N
     assert term.is_claimed
     assert term.sd_deg is not None
     assert term.sd_deg > 1.0
-    said = frame_sentences(explain(model, take, float(take.time_s[10])).frame)
+    said = explain(model, take, float(take.time_s[10])).sentences
     assert "Wearing 'tuesday' was not in training: donning_shift is not corrected." in said
 
 
@@ -246,7 +248,7 @@ def test_a_correction_that_is_absurd_is_left_out_and_said() -> None:
     angle = angle_of(model, recorded(10, "monday"), 20, item.rotations[0])
     is_whole(angle)
     assert not angle.is_corrected
-    assert any(sentence.startswith("Not corrected:") for sentence in angle_sentences(angle, None))
+    assert any(sentence.startswith("Not corrected:") for sentence in angle.sentences)
 
 
 def test_what_was_measured_and_what_repairs_change_of_it() -> None:
@@ -255,16 +257,17 @@ def test_what_was_measured_and_what_repairs_change_of_it() -> None:
     nothing = np.empty((3, 0))
     offset = AddedEffect("clock_offset", MEASURED, clock, np.zeros((3, 2)), nothing, np.zeros(3))
     found = explain(replace(BASE, effects=(offset,)), take, float(take.time_s[60]))
-    measured = found.measured["I_PIP"]
+    measured = found.of("I_PIP").measured
+    assert measured is not None
     assert measured.recorded_deg == pytest.approx(take.reference[60, 1])
     (repair,) = measured.repairs
     assert repair.name == "clock_offset"
     assert repair.degrees is not None
     assert abs(repair.degrees) > 0.1
     assert measured.degrees == pytest.approx(measured.recorded_deg + repair.degrees)
-    angle = next(item for item in found.frame.angles if item.rotation == "I_PIP")
+    angle = found.of("I_PIP")
     is_whole(angle)
-    (said,) = [one for one in angle_sentences(angle, measured) if one.startswith("Measured:")]
+    (said,) = [one for one in angle.sentences if one.startswith("Measured:")]
     assert "recorded" in said
     assert "clock_offset" in said
 

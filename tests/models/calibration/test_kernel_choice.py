@@ -17,11 +17,10 @@ from unknown_sensors import (
 from glovecal_models.calibration.artifact import dump, load, model_id, read_manifest
 from glovecal_models.calibration.kernel_choice import score_candidates
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import settings_of
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.sample_weight import Recorded
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings, settings_of
 from glovecal_models.comparison.compare import compare
 from glovecal_models.errors import BadInput, Cancelled, DamagedArtifact, NotTrainable
 from glovecal_models.improvement.add_effect import add_effect

@@ -9,13 +9,12 @@ import pytest
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.prior_mean import fit_on_plane, planes_of
+from glovecal_models.calibration.template import fit_on_plane, planes_of
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import PriorPlane, TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.protocol import evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 
 PLANE = PriorPlane("I_MCP", ("I_MCP",), (0.8,), -50.0)
 

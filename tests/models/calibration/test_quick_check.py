@@ -10,18 +10,15 @@ import pytest
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import requested_effects
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
-from glovecal_models.calibration.sensor_sensitivity import sensor_sensitivity
+from glovecal_models.calibration.samples import sensor_sensitivity
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings, requested_effects
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
-from glovecal_models.quick_check.held_poses import held_poses
-from glovecal_models.quick_check.pose_book import own_poses
+from glovecal_models.quick_check.held_poses import held_poses, own_poses
 from glovecal_models.quick_check.quick_check import quick_check
-from glovecal_models.quick_check.text import quick_check_sentences
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
@@ -113,13 +110,11 @@ def test_the_curved_regressor_too() -> None:
     assert rmse(found.model, it.natural) < 0.35 * rmse(it.model, it.natural)
     assert found.model.parent == "0" * 64
     expected = found.report.expected
-    assert expected["full_calibration_deg"] < expected["after_deg"] < 0.75 * expected["now_deg"]
+    assert expected.full_calibration_deg < expected.after_deg < 0.75 * expected.now_deg
     assert found.report.poses_held_out_deg is not None
     assert found.report.poses_held_out_deg < 0.4 * found.report.poses_before_deg
-    assert quick_check_sentences(found)[0].startswith("As found: ")
-    assert any(
-        "the expected error in this wearing falls from" in item for item in quick_check_sentences(found)
-    )
+    assert found.report.sentences[0].startswith("As found: ")
+    assert any("the expected error in this wearing falls from" in item for item in found.report.sentences)
 
 
 def test_without_the_effect_a_default_prior_is_taken() -> None:
@@ -131,7 +126,7 @@ def test_without_the_effect_a_default_prior_is_taken() -> None:
     assert [item.name for item in found.model.effects] == ["donning_shift"]
     assert requested_effects(found.model) == (), "learned anew from the training takes it would be nothing"
     mixed = quick_check(it.plain, [it.poses], trained_wearings=["wearing-1", "wearing-2"])
-    assert "2 wearings without separating them" in quick_check_sentences(mixed)[-1]
+    assert "2 wearings without separating them" in mixed.report.sentences[-1]
 
 
 def test_the_interval_is_as_wide_as_what_is_not_known() -> None:
@@ -185,7 +180,7 @@ def test_names_alone_will_do_and_a_take_may_be_a_pose() -> None:
     book = own_poses(it.training, it.ranges)
     named = unmeasured(it.poses)
     found = quick_check(it.model, [named], known=book)
-    assert all(pose.measured == 0 and pose.by_name == 3 for pose in found.poses)
+    assert all(pose.measured == 0 and pose.by_name == 3 for pose in found.report.poses)
     assert rmse(found.model, it.natural) < 0.4 * rmse(it.model, it.natural)
     measured = quick_check(it.model, [it.poses])
     assert np.diag(found.shift.covariance)[0] > np.diag(measured.shift.covariance)[0]
@@ -202,7 +197,7 @@ def test_names_alone_will_do_and_a_take_may_be_a_pose() -> None:
         reference_time_s=np.empty(0),
         reference=np.empty((0, 0)),
     )
-    assert [pose.by_name for pose in quick_check(it.model, [short], known=book).poses] == [3]
+    assert [pose.by_name for pose in quick_check(it.model, [short], known=book).report.poses] == [3]
 
 
 def test_what_no_pose_measured_keeps_the_prior_and_says_so() -> None:
@@ -210,7 +205,7 @@ def test_what_no_pose_measured_keeps_the_prior_and_says_so() -> None:
     take = replace(unmeasured(it.poses, ("I_MCP", "M_MCP")), poses=None)
     found = quick_check(it.model, [take])
     assert found.report.uninformed == ("I_PIP",)
-    assert "No pose informs I_PIP" in " ".join(quick_check_sentences(found))
+    assert "No pose informs I_PIP" in " ".join(found.report.sentences)
     lane = found.rotations.index("I_PIP")
     assert found.shift.mean[lane] == 0.0
     assert found.shift.covariance[lane, lane] == found.prior.covariance[lane, lane]
@@ -222,11 +217,11 @@ def test_a_mistaken_pose_is_left_out_and_named() -> None:
     book = own_poses(it.training, it.ranges)
     poses = tuple("flat" if name == "fist" else name for name in it.poses.poses or ())
     found = quick_check(it.model, [replace(unmeasured(it.poses), poses=poses)], known=book)
-    assert found.refused
-    assert all("pose flat" in item.label for item in found.refused)
-    assert "the hand looks like pose" in found.refused[0].reason
+    assert found.report.refused
+    assert all("pose flat" in item.pose for item in found.report.refused)
+    assert "the hand looks like pose" in found.report.refused[0].reason
     clean = quick_check(it.model, [unmeasured(it.poses)], known=book)
-    assert not clean.refused
+    assert not clean.report.refused
     assert rmse(found.model, it.natural) < 1.5 * rmse(clean.model, it.natural)
 
 
@@ -236,9 +231,9 @@ def test_a_pose_that_was_not_held_is_named() -> None:
     moving = replace(unmeasured(it.natural), readings=128 + wave * np.ones(3))
     run = tuple("fist" if 2 < time < 4 else "" for time in moving.time_s)
     mixed = quick_check(it.model, [it.poses, replace(moving, poses=run)])
-    assert [item.label for item in mixed.refused] == [f"pose fist at 2.0 s of take {moving.name}"]
-    assert "not held still for 0.4 s" in mixed.refused[0].reason
-    assert "% of its range" in mixed.refused[0].reason
+    assert [item.pose for item in mixed.report.refused] == [f"pose fist at 2.0 s of take {moving.name}"]
+    assert "not held still for 0.4 s" in mixed.report.refused[0].reason
+    assert "% of its range" in mixed.report.refused[0].reason
     with pytest.raises(BadInput, match="no pose was held still in these takes"):
         quick_check(it.model, [replace(moving, poses=run)])
 
@@ -259,7 +254,7 @@ def test_a_saturated_sensor_tells_nothing() -> None:
     readings[:, it.poses.sensors.index("I_PIP")] = 255.0
     found = quick_check(it.model, [replace(it.poses, readings=readings)])
     assert found.report.uninformed == ("I_PIP",)
-    assert all(pose.saturated == ("I_PIP",) for pose in found.poses)
+    assert all(pose.saturated == ("I_PIP",) for pose in found.report.poses)
 
 
 def test_what_cannot_be_checked_is_refused() -> None:

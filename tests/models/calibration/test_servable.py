@@ -10,13 +10,12 @@ import pytest
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
-from glovecal_models.calibration.servable import check_servable
+from glovecal_models.calibration.servable import WearerFit, check_servable
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.wearer_fit import WearerFit
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
-from glovecal_models.regression.known_line import line_of
+from glovecal_models.regression.linear_regressor import line_of
 from glovecal_models.takes.take import Take
 
 LAYOUT = Layout.from_toml("""

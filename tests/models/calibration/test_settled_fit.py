@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from further_forms import every_form
 
+from glovecal_models.calibration.added_effect import EffectRequest
 from glovecal_models.calibration.effect_fit import (
     NOISE_SHARE,
     correspondence_for,
     fit_with_effects,
     with_new_weights,
 )
-from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.fitted_effects import fitted_effects
-from glovecal_models.calibration.held_out_check import frame_errors_of
-from glovecal_models.calibration.own_signal import OwnSignal
-from glovecal_models.calibration.prepared_takes import PreparedTakes
+from glovecal_models.calibration.leave_out import frame_errors_of
+from glovecal_models.calibration.prepared_takes import OwnSignal, PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout

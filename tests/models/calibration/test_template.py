@@ -16,11 +16,9 @@ from glovecal_models.calibration.training_plan import plan_training
 from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout
-from glovecal_models.regression.known_line import fit_beside, gains_of, line_of
-from glovecal_models.regression.linear_regressor import LinearRegressor
+from glovecal_models.regression.linear_regressor import LinearRegressor, fit_beside, gains_of, line_of
 from glovecal_models.simulation.protocol import evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.take import Take
 
 LAYOUT = Layout.built_in("cyberglove18")

@@ -19,7 +19,6 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.calibration.unseen_wearing import LeftOutWearing, unseen_wearing
 from glovecal_models.comparison.compare import compare
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.comparison.text import wearing_error_sentences
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
 from glovecal_models.takes.clock_scan import aligned, clock_offsets
@@ -87,7 +86,7 @@ def test_training_tells_the_next_wearing_first_and_claims_it():
     assert found.unseen_wearing is not None
     assert found.seen_wearing is not None
     assert found.unseen_wearings == ("four",)
-    assert [text.split(":")[0] for text in wearing_error_sentences(found)] == [
+    assert [text.split(":")[0] for text in found.sentences] == [
         "In wearings not seen",
         "In the wearings seen",
     ]

@@ -8,9 +8,8 @@ import pytest
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.text import plan_sentences
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_plan import plan_training
+from glovecal_models.calibration.training_plan import plan_training, usable_sensors
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout

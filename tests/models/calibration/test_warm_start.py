@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration import effect_fit
+from glovecal_models.calibration.added_effect import EffectRequest
 from glovecal_models.calibration.effect_fit import fit_with_effects
-from glovecal_models.calibration.effect_request import EffectRequest
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.effects.catalogue import effect

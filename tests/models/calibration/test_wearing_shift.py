@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glovecal_models.calibration.sensor_sensitivity import SensorSensitivity
+from glovecal_models.calibration.samples import SensorSensitivity
 from glovecal_models.quick_check.wearing_shift import (
     OWN_SHARE,
     PoseError,

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.camera_reference.estimates import (
+from glovecal_models.takes.camera_estimates import (
     CameraEstimates,
     read_estimates,
     without_repeats,
@@ -84,7 +84,7 @@ def test_other_files_are_refused_and_nothing_is_unpickled(tmp_path: Path, kind: 
 def test_an_archive_that_would_unpack_too_large_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
     write_estimates(estimates(2000), tmp_path / "e.npz")
     size = (tmp_path / "e.npz").stat().st_size
-    monkeypatch.setattr("glovecal_models.takes.camera_reference.estimates.LARGEST_ESTIMATES", size)
+    monkeypatch.setattr("glovecal_models.takes.camera_estimates.LARGEST_ESTIMATES", size)
     monkeypatch.setattr("numpy.load", lambda *_, **__: pytest.fail("unpacked"))
     with pytest.raises(BadInput, match=f"of {size} bytes at most"):
         read_estimates(tmp_path / "e.npz")
@@ -130,8 +130,7 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path):
 
 
 def test_poses_of_a_camera_become_estimates():
-    from glovecal_models.colour_glove.hand_state import HandState
-    from glovecal_models.colour_glove.pose_estimate import PoseEstimate, camera_estimates
+    from glovecal_models.colour_glove.hand_state import HandState, PoseEstimate, camera_estimates
 
     state = HandState(np.arange(20.0), np.eye(3), np.array([0.0, 0.0, 400.0]))
     sure = np.arange(20) < 5

@@ -7,15 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from simulated_camera import CALIBRATED, SimulatedCamera, lasting_noise
 
 from glovecal_models.errors import BadInput
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan, TakeMotion
-from glovecal_models.simulation.simulated_camera import CALIBRATED, SimulatedCamera, lasting_noise
-from glovecal_models.takes.camera_reference.camera_clock import camera_clock
-from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
-from glovecal_models.takes.camera_reference.covered_range import ALIKE_S, covered_ranges, thinned
-from glovecal_models.takes.camera_reference.estimates import CameraEstimates
+from glovecal_models.takes.camera_estimates import ALIKE_S, CameraEstimates, covered_ranges, thinned
+from glovecal_models.takes.camera_reference import CAMERA_PATCHES, camera_clock, reference_from_camera
 from glovecal_models.takes.take import Take
 
 
@@ -101,7 +99,7 @@ def test_a_rotation_whose_deep_flexion_was_never_seen_says_so():
     found = reference_from_camera(take, replace(estimates, accepted=accepted))
     of_pip = next(item for item in found.ranges if item.rotation == "I_PIP")
     assert of_pip.high_deg < 35.0
-    assert "It never saw deep flexion (" in of_pip.sentence()
+    assert "It never saw deep flexion (" in of_pip.sentence
     assert list(of_pip.holds(np.array([-90.0, of_pip.low_deg, 60.0]))) == [False, True, False]
 
 

@@ -13,15 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from glovecal_models.colour_glove.board_views import ViewCollector, board_view, board_views
-from glovecal_models.colour_glove.camera_calibration import CameraCalibration, calibrate_camera, place_camera
-from glovecal_models.colour_glove.camera_file import (
+from glovecal_models.colour_glove.camera_calibration import (
+    CameraCalibration,
+    ViewCollector,
+    board_view,
+    board_views,
+    calibrate_camera,
+    place_camera,
+)
+from glovecal_models.colour_glove.camera_model import (
+    Camera,
     camera_document,
     camera_from_document,
     read_cameras,
     write_cameras,
 )
-from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
 from glovecal_models.errors import BadInput
 

@@ -11,13 +11,16 @@ import pypdfium2
 import pytest
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.drawn.photograph import Photographer, Photography, labelled_photographs
-from glovecal_models.colour_glove.palette import PRINTED_SRGB, encoded_light, linear_light
-from glovecal_models.colour_glove.pattern import printed_pattern
-from glovecal_models.colour_glove.pictures.card_picture import card_colours, page_corners
+from glovecal_models.colour_glove.pattern import PRINTED_SRGB, encoded_light, linear_light, printed_pattern
+from glovecal_models.colour_glove.photograph import (
+    Photographer,
+    Photography,
+    hand_motion,
+    labelled_photographs,
+)
 from glovecal_models.colour_glove.pictures.classify import ColourTable
-from glovecal_models.colour_glove.sheets.colour_card import colour_card
+from glovecal_models.colour_glove.pictures.white_balance import card_colours, page_corners
+from glovecal_models.colour_glove.sheets.calibration_board import colour_card
 from glovecal_models.colour_glove.sheets.sheet import write_sheets
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.errors import BadInput

@@ -26,16 +26,6 @@ def frames(skin: HandSkin, angles: np.ndarray) -> HandFrames:
     return forward_kinematics(skin.skeleton, np.array([all_angles]))
 
 
-@settings(max_examples=40)
-@given(st.integers(0, 10_000))
-def test_a_state_is_what_its_26_numbers_say(seed):
-    state = drawn(seed)
-    again = HandState.from_vector(state.vector())
-    assert np.allclose(again.rotation, state.rotation, atol=1e-9)
-    assert np.allclose(again.angles_deg, state.angles_deg)
-    assert np.allclose(again.position_mm, state.position_mm)
-
-
 def test_a_step_turns_the_palm_about_the_cameras_axes():
     state, step = drawn(1), np.zeros(26)
     step[22] = 90.0

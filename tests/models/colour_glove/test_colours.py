@@ -8,18 +8,16 @@ import pytest
 from sklearn.mixture import GaussianMixture
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import PoseDatabase
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.drawn.photograph import (
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
+from glovecal_models.colour_glove.pattern import encoded_light, glove_pattern, linear_light
+from glovecal_models.colour_glove.photograph import (
     Photograph,
     Photographer,
     Photography,
+    hand_motion,
     labelled_photographs,
 )
-from glovecal_models.colour_glove.lookup import PoseLookup
-from glovecal_models.colour_glove.palette import encoded_light, linear_light
-from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable, _Mixture, many_coloured
 from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains, white_gains
 from glovecal_models.colour_glove.pose.error_learning import drawn_colours, other_hand

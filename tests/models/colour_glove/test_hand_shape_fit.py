@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import PoseDatabase
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.hand_state import STAGES
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pose.dense import joint_equations, label_equations
 from glovecal_models.colour_glove.pose.error_learning import other_hand
 from glovecal_models.colour_glove.pose.hand_shape_fit import (
@@ -17,10 +17,8 @@ from glovecal_models.colour_glove.pose.hand_shape_fit import (
     fitted_hand_shape,
     shaped,
 )
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, scale_name
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, LearnedErrors, scale_name
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
-from glovecal_models.colour_glove.pose_estimate import STAGES
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.errors import BadInput, Cancelled

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import PoseDatabase
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
+from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pose.error_learning import (
     PEOPLE,
     ShapeSpread,
@@ -19,8 +18,7 @@ from glovecal_models.colour_glove.pose.error_learning import (
     other_hand,
     spoilt,
 )
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, LearnedErrors, fitted_scale
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed

@@ -10,12 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import PoseDatabase, palm_centre
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.hand_state import HandState
-from glovecal_models.colour_glove.lookup import PoseLookup
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
+from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pictures.picture_check import KINDS, Finding, PictureCheck
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed

@@ -14,18 +14,17 @@ import numpy as np
 import pytest
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.pca import pca_code
 from glovecal_models.colour_glove.database import palm_centre, pose_database
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
-from glovecal_models.colour_glove.drawn.photograph import (
+from glovecal_models.colour_glove.hand_state import HandState
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
+from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
+from glovecal_models.colour_glove.photograph import (
     Photograph,
     Photographer,
     Photography,
+    hand_motion,
     labelled_photographs,
 )
-from glovecal_models.colour_glove.hand_state import HandState
-from glovecal_models.colour_glove.lookup import PoseLookup
-from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
 from glovecal_models.colour_glove.pose.error_learning import other_hand

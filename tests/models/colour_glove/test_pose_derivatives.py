@@ -14,8 +14,7 @@ from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, RANGE_DE
 from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.pose.centroid_ik import correspondences, drawn_patches
 from glovecal_models.colour_glove.pose.dense import label_equations, refine_by_labels
-from glovecal_models.colour_glove.pose.gaussian_step import Belief, damped_step
-from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
+from glovecal_models.colour_glove.pose.window_step import Belief, damped_step, pixel_motion
 from glovecal_models.colour_glove.pose.window_view import (
     DRAWN_POINTS,
     SEEN_POINTS,

@@ -2,20 +2,25 @@
 
 import numpy as np
 import pytest
+from boosted_code import BoostedCode, boosted_code
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_edt
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.codes.boosted import BoostedCode, boosted_code
-from glovecal_models.colour_glove.codes.pca import pca_code
-from glovecal_models.colour_glove.crop import Window, glove_window, tiny_image
+from glovecal_models.colour_glove.crop import (
+    CAP,
+    Window,
+    distance_transform,
+    glove_window,
+    image_distance,
+    tiny_image,
+)
 from glovecal_models.colour_glove.database import PoseDatabase, orientations, rendered_views
 from glovecal_models.colour_glove.hand_state import HandState
-from glovecal_models.colour_glove.image_distance import CAP, distance_transform, image_distance
-from glovecal_models.colour_glove.lookup import Neighbours, PoseLookup
+from glovecal_models.colour_glove.lookup import Neighbours, PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
-from glovecal_models.colour_glove.pictures.sighting import Sighting
+from glovecal_models.colour_glove.pictures.picture_check import Sighting
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
@@ -93,8 +98,8 @@ def test_a_window_follows_the_glove_wherever_it_is_and_however_large(seed):
     tiny = tiny_image(labels, window)
     share = (2 * window.half / size) ** 2
     assert (tiny == 3).mean() == pytest.approx(1 / share, rel=0.25)
-    points = rng.uniform(0, 100, (5, 2))
-    assert np.allclose(window.from_tiny(window.to_tiny(points)), points)
+    corners = np.array([[window.u - window.half, window.v], [window.u + window.half, window.v]])
+    assert np.allclose(window.to_tiny(corners)[:, 0], [-0.5, len(tiny) - 0.5])
 
 
 def test_no_glove_no_window_and_stray_pixels_do_not_move_it():

@@ -10,10 +10,15 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from glovecal_models.colour_glove.palette import PRINTED_SRGB
-from glovecal_models.colour_glove.pattern import glove_pattern, printed_pattern
-from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard, board_box, board_sheet
-from glovecal_models.colour_glove.sheets.colour_card import GREYS, card_fields, colour_card
+from glovecal_models.colour_glove.pattern import PRINTED_SRGB, glove_pattern, printed_pattern
+from glovecal_models.colour_glove.sheets.calibration_board import (
+    GREYS,
+    CalibrationBoard,
+    board_box,
+    board_sheet,
+    card_fields,
+    colour_card,
+)
 from glovecal_models.colour_glove.sheets.flat_glove import FlatPiece, flat_pieces
 from glovecal_models.colour_glove.sheets.glove_sheets import (
     SEAM_ALLOWANCE_MM,

@@ -6,8 +6,8 @@ import numpy as np
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.comparison.cross_validation_difference import cross_validation_difference
-from glovecal_models.comparison.text import cross_validation_sentences
+from glovecal_models.comparison.compare import cross_validation_difference
+from glovecal_models.comparison.where.answer import cross_validation_sentences
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 

@@ -26,7 +26,7 @@ def noise(seed: int) -> np.ndarray:
 
 def shown_over(place: str) -> Effect:
     """Some effect that declares it."""
-    return next(each for each in catalogue().values() if each.shown_over == place)
+    return next(each for each in catalogue().values() if each.about.shown_over == place)
 
 
 def drawn(found: Residuals, place: str) -> EffectPicture:
@@ -38,7 +38,7 @@ def test_every_effect_declares_a_picture_that_can_be_drawn(take_residuals: Make,
     other = 30 * np.cos(TIME)
     found = together(take_residuals(ANGLE, 2 + noise(1), other, context=context))
     for each in catalogue().values():
-        if each.neighbours:
+        if each.about.neighbours:
             with pytest.raises(BadInput, match="no other sensor"):
                 effect_picture(found, each, "A")
             continue

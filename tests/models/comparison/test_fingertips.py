@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from glovecal_models.comparison.compare import summed_up
-from glovecal_models.comparison.fingertips import TIPS, fingertip_errors
+from glovecal_models.comparison.fingertips import TIPS, fingertip_errors, hand_poses, tips_mm
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.hand_poses import hand_poses, tips_mm
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
-from glovecal_models.comparison.text import fingertips_sentence
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import ARCHING_ROTATIONS, HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.simulation.hand_motion import random_posture
+from glovecal_models.simulation.protocol import random_posture
 from glovecal_models.simulation.simulated_hand import DRIVEN
 from glovecal_models.takes.take import Take
 
@@ -114,7 +112,7 @@ def test_what_was_not_measured_is_taken_equal_and_named() -> None:
     straight = fingertip_errors(found(still(I_DIP=20.0), still(I_DIP=20.0, I_PIP=5.0)), {}, HAND)
     assert straight is not None
     assert errors.fingers["index"].rmse_mm == pytest.approx(straight.fingers["index"].rmse_mm)
-    assert "T_VIR and I_DIP were not measured throughout and assumed equal." in fingertips_sentence(errors)
+    assert "T_VIR and I_DIP were not measured throughout and assumed equal." in errors.sentence
 
 
 def test_only_fingers_count_whose_chain_was_predicted_and_measured() -> None:
@@ -213,12 +211,12 @@ def test_the_sentence_says_whether_the_hand_was_measured() -> None:
     assumed = summed_up(residuals).fingertips
     assert assumed is not None
     assert (assumed.hand_length_mm, assumed.is_assumed) == (190.0, True)
-    assert "(RMSE, for a hand of 190 mm, an assumed size; noise floor" in fingertips_sentence(assumed)
+    assert "(RMSE, for a hand of 190 mm, an assumed size; noise floor" in assumed.sentence
     assert set(assumed.fingers) == set(TIPS)
     known = summed_up(residuals, dimensions=HAND).fingertips
     assert known is not None
     assert not known.is_assumed
-    assert "(RMSE, for a hand of 190 mm; noise floor" in fingertips_sentence(known)
+    assert "(RMSE, for a hand of 190 mm; noise floor" in known.sentence
     other = found({"A": np.zeros(5)}, {"A": np.ones(5)}, ("A",))
     assert summed_up(other).fingertips is None
 

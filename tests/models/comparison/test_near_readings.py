@@ -9,8 +9,8 @@ import pytest
 
 from glovecal_models.calibration.text import dead_sensor_sentences
 from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_plan import usable_sensors
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.calibration.usable_sensors import usable_sensors
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.layout import Layout

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.comparison.shown_frames import shown_frames
+from glovecal_models.takes.shown_frames import shown_frames
 
 
 @pytest.mark.parametrize("most", [50, 200, 1999])

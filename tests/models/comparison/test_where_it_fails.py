@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.comparison.text import rotation_sentence, wearings_sentence
-from glovecal_models.comparison.wearings import _partitions, _permutations, wearing_errors
-from glovecal_models.comparison.where_it_fails import where_it_fails, worst_stretches
+from glovecal_models.comparison.where_it_fails import (
+    partitions,
+    permutations,
+    wearing_errors,
+    where_it_fails,
+    worst_stretches,
+)
 
 
 def test_the_neighbour_that_pulls_is_named(take_residuals, together, holds, slow):
@@ -20,8 +24,8 @@ def test_the_neighbour_that_pulls_is_named(take_residuals, together, holds, slow
         takes.append(take_residuals(angle, error, other, name=f"take{number}"))
     [rotation] = where_it_fails(together(*takes)).rotations
     assert rotation.structure[0].covariate == rotation.dependences[0].covariate == "sensor B"
-    assert "It depends on the reading of sensor B" in rotation_sentence(rotation)
-    assert "noise floor 0.5" in rotation_sentence(rotation)
+    assert "It depends on the reading of sensor B" in rotation.sentence
+    assert "noise floor 0.5" in rotation.sentence
     assert "time in take" not in {item.covariate for item in rotation.structure}
 
 
@@ -33,17 +37,17 @@ def test_nothing_is_left_to_gain_at_the_floor_and_a_constant_is_said(take_residu
         where_it_fails(together(take_residuals(angle + noise, shift - noise, angle[::-1]))).rotations[0]
         for shift in (0.0, 4.0)
     )
-    assert "at the noise floor" in rotation_sentence(at_floor)
-    assert "mostly a constant +4.0" in rotation_sentence(shifted)
-    assert "no recorded column explains it" in rotation_sentence(shifted)
+    assert "at the noise floor" in at_floor.sentence
+    assert "mostly a constant +4.0" in shifted.sentence
+    assert "no recorded column explains it" in shifted.sentence
 
 
 def test_a_prediction_that_jitters_is_not_called_a_floor(take_residuals, together, holds):
     angle = holds(12)
     jitter = 2.0 * np.random.default_rng(10).normal(size=len(angle))
     [found] = where_it_fails(together(take_residuals(angle, jitter, angle))).rotations
-    assert "the prediction's own jitter of 2.0" in rotation_sentence(found)
-    assert "at the noise floor" not in rotation_sentence(found)
+    assert "the prediction's own jitter of 2.0" in found.sentence
+    assert "at the noise floor" not in found.sentence
 
 
 def test_the_worst_second_is_found_with_take_and_time(take_residuals, together):
@@ -78,7 +82,7 @@ def test_wearings_are_told_apart_by_dealing_their_takes(take_residuals, together
     assert shifted is not None
     assert shifted.p_value is not None
     assert shifted.p_value <= 0.01
-    assert "changes with the wearing" in wearings_sentence(shifted)
+    assert "changes with the wearing" in shifted.sentence
     same = wearing_errors(found(0.0, 4, 3), "A", generator)
     assert same is not None
     assert same.p_value is not None
@@ -86,13 +90,13 @@ def test_wearings_are_told_apart_by_dealing_their_takes(take_residuals, together
     few = wearing_errors(found(3.0, 2, 2), "A", generator)
     assert few is not None
     assert few.p_value is None
-    assert "too few takes to say" in wearings_sentence(few)
+    assert "too few takes to say" in few.sentence
     assert wearing_errors(found(0.0, 4, 1), "A", generator) is None
 
 
 @pytest.mark.parametrize(("counts", "ways"), [((2, 2), 3), ((3, 3), 10), ((2, 3), 10), ((2, 2, 2), 15)])
 def test_partitions_are_counted_and_each_is_dealt_once(counts, ways):
     owners = np.repeat(np.arange(len(counts)), counts)
-    assert _partitions(counts) == ways
-    dealt = _permutations(owners, counts, np.random.default_rng(0))
+    assert partitions(counts) == ways
+    dealt = permutations(owners, counts, np.random.default_rng(0))
     assert len(dealt) == ways - 1  # the true one is left out

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from simulated_camera import CALIBRATED
 
 from glovecal_models.calibration.held_out import BaseProducts, Rows, held_out, with_precision
 from glovecal_models.diagnosis.diagnose import diagnose
@@ -17,8 +18,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_camera import CALIBRATED
-from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
+from glovecal_models.takes.camera_reference import CAMERA_PATCHES, reference_from_camera
 from glovecal_models.takes.take import Take
 
 SENSORS = ("I_MCP", "M_MCP")

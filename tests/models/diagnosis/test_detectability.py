@@ -7,19 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.detectability.confusability import confusability
-from glovecal_models.diagnosis.detectability.detection import (
+from glovecal_models.diagnosis.detectability.answer import (
     Control,
-    Detectability,
+    EffectDetectability,
     Outcome,
     SizeTried,
     Trial,
-    detectability,
-    trial,
 )
+from glovecal_models.diagnosis.detectability.confusability import confusability
+from glovecal_models.diagnosis.detectability.detection import Detection, trial
 from glovecal_models.diagnosis.detectability.injection import injected, injected_takes, why_not_injected
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
-from glovecal_models.diagnosis.detectability.text import confusability_sentences, detectability_sentence
 from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.resampled import SMOOTHING
@@ -117,16 +115,19 @@ def test_what_cannot_be_put_in_says_why(session):
     assert "signature" in str(why["saturation"])
     assert why["contact_pressure"] == "no context column c.contact_n was recorded"
     assert "absence" in str(why["no_effect"])
-    found = detectability(session, effect("saturation"))
+    [found] = Detection(session.on, ["saturation"], trials=1).answered().effects
     assert found.sizes == ()
-    assert "cannot be tried" in detectability_sentence(found)
+    assert "cannot be tried" in found.sentence
     shared = Layout.from_columns("shared", SENSORS, ("BEND", "SPREAD"))
     renamed = [replace(take, rotations=("BEND", "SPREAD")) for take in session.on.takes]
     without = SurrogateSession.of(ModelOnTakes(tuple(renamed), shared))
     assert why_not_injected(without, effect("hysteresis")) == "no rotation has a working sensor of its own"
-    assert detectability(without, effect("hysteresis")).sizes == ()
-    with pytest.raises(BadInput, match="no take measured 'R_PIP'"):
-        detectability(session, effect("hysteresis"), ["R_PIP"])
+    [found] = Detection(without.on, ["hysteresis"], trials=1).answered().effects
+    assert found.sizes == ()
+    with pytest.raises(BadInput, match="no rotation 'R_PIP' in this layout"):
+        Detection(session.on, ["hysteresis"], [("R_PIP",)]).require()
+    with pytest.raises(BadInput, match="too many"):
+        Detection(session.on, sizes_deg=range(1, 50), trials=50).require()
 
 
 def test_alike_effects_are_listed_and_an_effect_is_most_like_itself(session):
@@ -139,33 +140,34 @@ def test_alike_effects_are_listed_and_an_effect_is_most_like_itself(session):
     assert pair.is_confused
     assert pair.next_take is not None
     assert all(0 <= pair.correlation <= 1 + 1e-9 for pair in found.pairs)
-    assert found.condition["I_PIP"] == float("inf")
-    assert 1 < found.condition_of_others["I_PIP"] < 1e6
-    assert "clock_offset and glove_latency" in confusability_sentences(found)[0]
+    assert found.condition["I_PIP"] is None
+    assert 1 < (found.condition_of_others["I_PIP"] or 0) < 1e6
+    assert "clock_offset and glove_latency" in found.sentences[0]
 
 
 def tried(size_deg: float, *outcomes: Outcome) -> SizeTried:
-    return SizeTried(size_deg, tuple(Trial(item, ("creep",)) for item in outcomes))
+    return SizeTried.of(size_deg, [Trial(item, ("creep",)) for item in outcomes], "hysteresis")
 
 
 def test_sizes_are_interpolated_over_monotone_shares():
-    found = Detectability(
+    found = EffectDetectability(
         "hysteresis",
         ("I_PIP",),
         (
-            tried(1.0, "not found", "not found"),
-            tried(2.0, "named", "not found"),
+            tried(1.0, "not_found", "not_found"),
+            tried(2.0, "named", "not_found"),
             tried(4.0, "named", "named"),
         ),
     )
     assert found.size_deg(0.5, "named") == pytest.approx(2.0)
     assert found.size_deg(0.75, "named") == pytest.approx(2.0 * 2**0.5)
-    assert detectability_sentence(found) == (
+    assert found.sentence == (
         "hysteresis on I_PIP: 4 degrees would have been named (2 of 2 trials), 1 degree would not"
         " (0 of 2 trials)."
     )
-    wavy = Detectability("lag", (), (tried(1.0, "named"), tried(2.0, "not found"), tried(4.0, "named")))
+    wavy = EffectDetectability("lag", (), (tried(1.0, "named"), tried(2.0, "not_found"), tried(4.0, "named")))
     assert wavy.size_deg(0.5, "named") == 1.0
     assert wavy.size_deg(0.8, "named") == pytest.approx(2.0 * 2**0.6)
-    assert Detectability("lag", (), (tried(1.0, "mistaken"),)).size_deg(0.5, "named") is None
-    assert Control((Trial("mistaken", ("creep", "lag")), Trial("not found", ()))).named == {"creep": 1}
+    assert EffectDetectability("lag", (), (tried(1.0, "mistaken"),)).size_deg(0.5, "named") is None
+    control = Control.of([Trial("mistaken", ("creep", "lag")), Trial("not_found", ())])
+    assert control.named == {"creep": 1}

@@ -14,7 +14,7 @@ from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.diagnosis.text import within_known_sentence
 from glovecal_models.effects.base.assessment import HeldOutRmse
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.catalogue import effect, relations
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -70,6 +70,8 @@ def test_an_action_is_held_against_an_effect_that_others_explain_a_part_of(monke
     monkeypatch.setattr(actions, "formed_rmse", lambda *_: HeldOutRmse(3.108, 3.070, 3.472))
     design = DiagnosisProblem.of(takes_with(), LAYOUT, False, ()).design()
     asked = [ResidualAssociation("I_MCP", "time in take", "the time in the take", 1.0, 0.01)]
-    [found] = actions.actions_for(asked, design, LAYOUT, set(), linear=False, wholes=(effect(whole),))
+    [found] = actions.actions_for(
+        asked, design, LAYOUT, set(), linear=False, wholes=(relations().whole(whole),)
+    )
     assert (found.effect, found.saves) == ("creep", True)
     assert found.is_within_known is is_within

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.not_identifiable import Undecidable, undecidable
+from glovecal_models.diagnosis.next_take import Undecidable, undecidable
 from glovecal_models.diagnosis.text import residual_sentence
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -37,7 +37,7 @@ def signals(wearings: Sequence[str], temperatures: Sequence[float] = (), motions
 
 
 def why_not(takes: Sequence[Signals], name: str) -> Undecidable:
-    found = undecidable(takes, catalogue()[name])
+    found = undecidable(takes, stored_correction(name, {}))
     assert found is not None
     return found
 
@@ -61,8 +61,8 @@ def test_two_wearings_of_four_motions_ask_for_a_third():
 
 def test_what_is_asked_for_is_enough():
     three = signals("aaaabbbbcccc", motions="klmnklmnklmn")
-    assert undecidable(three, catalogue()["donning_shift"]) is None
-    assert undecidable(signals("aaabbbccc"), catalogue()["donning_shift"]) is None
+    assert undecidable(three, stored_correction("donning_shift", {})) is None
+    assert undecidable(signals("aaabbbccc"), stored_correction("donning_shift", {})) is None
     assert "a third wearing with 3 takes" in why_not(signals("aabb"), "donning_shift").why
 
 
@@ -76,7 +76,7 @@ def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
     assert f"allow {ways} permutations, temperature needs 40" in found.why
     assert f"record {more} more take" in found.why
     added = [*degrees, *(40.0 + 5 * number for number in range(more))]
-    assert undecidable(signals("a" * len(added), added), catalogue()["temperature"]) is None
+    assert undecidable(signals("a" * len(added), added), stored_correction("temperature", {})) is None
 
 
 def test_a_shift_between_two_wearings_is_no_verdict_but_a_next_take(shifted):

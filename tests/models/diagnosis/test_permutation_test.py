@@ -7,7 +7,7 @@ import pytest
 
 from glovecal_models.diagnosis.permutation_test import _Given, _Projected
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.catalogue import stored_correction
 
 FRAMES, TAKES, JOINTS = 60, 3, 2
 
@@ -34,9 +34,9 @@ def test_joints_that_were_measured_in_different_rows_are_explained_as_if_alone(m
     random = np.random.default_rng(4)
     takes = [a_take(random, number) for number in range(TAKES)]
     joints = [a_joint(random, 2, slice(0, 0)), a_joint(random, 3, missing)]
-    known = effect("temperature")
+    known = stored_correction("temperature", {})
     settings = known.fit_constants(takes)
-    grid = known.grid(takes, settings)
+    grid = known.shape.grid(takes, settings)
     givers = np.array([1, 2, 0])
     together = _Given(known, settings, grid, takes, joints).explained(givers)
     for lane, joint in enumerate(joints):

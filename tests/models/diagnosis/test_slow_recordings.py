@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES
+from glovecal_models.diagnosis.next_take import SINGLE_POSES
 from glovecal_models.diagnosis.resampled import SHORTEST_BRIDGE_S, bridge_s
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause

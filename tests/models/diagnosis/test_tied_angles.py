@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.forward_design import tied_angles
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
-from glovecal_models.diagnosis.tied_angles import tied_angles
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session

@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.confidence_set import beside_findings
 from glovecal_models.diagnosis.diagnose import diagnose
-from glovecal_models.diagnosis.naming import Naming, beside_wholes, saved_share_of
+from glovecal_models.diagnosis.naming import Naming, also_found, parts_of, saved_share_of
 from glovecal_models.diagnosis.signatures import is_outweighed, may_explain
 from glovecal_models.diagnosis.text import part_sentence
 from glovecal_models.effects.base.assessment import Assessment, JointErrors
-from glovecal_models.effects.base.signature_effect import Finding
-from glovecal_models.effects.catalogue import catalogue, effect
+from glovecal_models.effects.base.findings import Finding
+from glovecal_models.effects.catalogue import catalogue, effect, relations
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 
 BLOCKS = 12
+SENSOR_OF = {"J0": "J0", "J1": "J1"}
 
 
 def ranked(name: str, saved: float, joints: int = 2, square: float = 4.0) -> Assessment:
@@ -66,14 +66,17 @@ def test_slips_that_are_larger_than_the_wearings_come_first():
     assert may_explain(effect("garment_slip"), wearings, [slip("donning_shift"), slip()], catalogue())
 
 
+SLIPS = relations().whole("garment_slip")
+
+
 def test_beside_a_known_slip_a_column_has_to_explain_more_than_a_part():
     found = [ranked("temperature", 0.4), ranked("temperature", 0.7), ranked("hysteresis", 0.4)]
-    kept = [bool(item.significant_joints) for item in beside_wholes(found, [effect("garment_slip")])]
+    kept = [bool(item.significant_joints) for item in parts_of(found, [SLIPS])]
     assert kept == [False, True, True]
-    refused = beside_wholes(found, [effect("garment_slip")])[0]
+    refused = parts_of(found, [SLIPS])[0]
     assert not refused.within_known
     assert "more than a part of garment_slip" in part_sentence(refused)
-    assert all(item.significant_joints for item in beside_wholes(found, []))
+    assert all(item.significant_joints for item in parts_of(found, []))
 
 
 def test_the_share_is_that_of_all_significant_joints_together():
@@ -97,16 +100,14 @@ def test_what_saves_half_of_what_is_left_is_no_rest_of_a_form():
     ("where", "expected"), [("J0", ("hysteresis", "sensor_fault")), ("J5", ("hysteresis",))]
 )
 def test_a_sensor_that_jumps_where_hysteresis_saves_error_may_be_either(where, expected):
-    layout = Layout.from_columns("glove", ["J0", "J1"], ["J0", "J1"])
     fault = Finding("sensor_fault", (where,), "it jumps", rivals=("hysteresis",))
-    assert beside_findings(naming(ranked("hysteresis", 0.3)), [fault], layout).confidence_set == expected
+    assert also_found(naming(ranked("hysteresis", 0.3)), [fault], SENSOR_OF).confidence_set == expected
 
 
 def test_a_ranked_effect_that_is_no_rival_of_a_finding_stays_alone():
-    layout = Layout.from_columns("glove", ["J0", "J1"], ["J0", "J1"])
     found = naming(ranked("lag", 0.3))
     fault = Finding("sensor_fault", ("J0",), "it jumps", rivals=("hysteresis",))
-    assert beside_findings(found, [fault], layout) == found
+    assert also_found(found, [fault], SENSOR_OF) == found
 
 
 def test_repeated_frames_are_dropped_before_a_take_is_asked_for_that_tells_apart_what_they_look_like():

@@ -15,8 +15,7 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.worn_glove import worn_glove_findings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.take import Take
 
 RATE_HZ = 60.0

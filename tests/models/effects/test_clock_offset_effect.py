@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.delay.clock_drift import clock_drift
-from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
+from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect, clock_drift
 
 CLOCK = ClockOffsetEffect()
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glovecal_models.effects.delay.clock_path import cells_of_others
 from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm
-from glovecal_models.effects.delay.delay_verdict import clock_choice, possible_delays
+from glovecal_models.effects.delay.delay_verdict import cells_of_others, clock_choice, possible_delays
 
 DELAYS_S = np.round(np.arange(-0.1, 0.1001, 0.005), 3)
 BLOCKS, JOINTS = 24, 4

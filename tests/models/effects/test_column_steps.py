@@ -17,7 +17,7 @@ from glovecal_models.effects.base.column_steps import (
     step_prior_sd,
 )
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.catalogue import effect as catalogue_effect
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.errors import BadInput
 
 TAKES, FRAMES, JOINTS = 12, 400, 3
@@ -114,16 +114,16 @@ def test_columns_names_and_deviations_go_together():
 
 @pytest.mark.parametrize("name", ["temperature", "humidity", "supply_sag"])
 def test_frame_by_frame_gives_the_columns_of_the_whole_take(name):
-    effect, random = catalogue_effect(name), np.random.default_rng(1)
+    effect, random = stored_correction(name, {}), np.random.default_rng(1)
     time, own = np.arange(300) / 60, random.uniform(-10, 60, (300, 2))
     context = {effect.context[0]: np.linspace(3.6, 4.2, 300)}
     take = Signals(time, own, {}, context, "w", "t", np.zeros(2))
     settings = effect.fit_constants([take]) | ColumnSteps(0.1, 3.61).to_settings()
-    shape = effect.grid([take], settings)[0]
-    whole, stream = effect.columns(take, settings, shape), effect.stream(settings, shape)
+    shape = effect.shape.grid([take], settings)[0]
+    whole, stream = effect.columns(take, settings, shape), effect.dynamics.stream(settings, shape)
     frames = [stream.columns(take.at(slice(at, at + 1))) for at in range(300)]
     assert np.concatenate(frames) == pytest.approx(whole, abs=1e-9)
-    assert whole.shape[2] == len(effect.prior_sd(settings)) == len(effect.weight_names(settings))
+    assert whole.shape[2] == len(effect.weights(settings).prior_sd) == len(effect.weights(settings).names)
 
 
 def test_a_column_that_never_changes_has_no_steps():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glovecal_models.effects.base.signature_effect import Finding, Stretch
+from glovecal_models.effects.base.findings import Finding, Stretch
 from glovecal_models.effects.sensor_fault.common_faults import without_common_faults
 
 

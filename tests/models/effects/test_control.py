@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.base.control import control_columns
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.errors import BadInput
 
 
 def test_reversed_in_time_is_the_operator_run_backwards(signals):
-    creep = catalogue()["creep"]
+    creep = stored_correction("creep", {})
     shape = np.tile([1.0, 4.0, 16.0], (3, 1))
     take = signals[0]
     [twin] = control_columns(creep, [take], {}, shape, np.random.default_rng(0))
@@ -22,7 +22,7 @@ def test_reversed_in_time_is_the_operator_run_backwards(signals):
 
 
 def test_rolled_in_time_keeps_the_values_and_moves_them(signals):
-    coupling = catalogue()["cross_coupling"]
+    coupling = stored_correction("cross_coupling", {})
     settings, shape = coupling.fit_constants(signals), np.zeros((3, 0))
     for seed in range(5):
         twins = control_columns(coupling, signals, settings, shape, np.random.default_rng(seed))
@@ -33,7 +33,7 @@ def test_rolled_in_time_keeps_the_values_and_moves_them(signals):
 
 
 def test_context_comes_from_another_wearing(signals):
-    temperature = catalogue()["temperature"]
+    temperature = stored_correction("temperature", {})
     settings, shape = temperature.fit_constants(signals), np.zeros((3, 0))
     time, own = signals[3].time_s[:500], signals[3].own[:500]
     context = {"temperature_c": signals[3].context["temperature_c"][:500]}
@@ -52,7 +52,7 @@ def test_context_comes_from_another_wearing(signals):
 
 def permuted(takes, seed):
     """The wearing each take got."""
-    donning = catalogue()["donning_shift"]
+    donning = stored_correction("donning_shift", {})
     settings = donning.fit_constants(takes)
     twins = control_columns(donning, takes, settings, np.zeros((3, 0)), np.random.default_rng(seed))
     wearings = settings["wearings"]
@@ -86,18 +86,18 @@ def test_wearings_that_have_no_other_permutation_are_refused(signals):
 
 @pytest.mark.parametrize("name", ["cross_coupling", "palm_arch", "donning_shift", "nonlinearity"])
 def test_what_does_not_remember_is_the_same_at_some_rows_only(signals, name):
-    effect = catalogue()[name]
+    effect = stored_correction(name, {})
     settings = effect.fit_constants(signals)
-    shape = effect.grid(signals, settings)[0]
+    shape = effect.shape.grid(signals, settings)[0]
     rows = [slice(1, len(take), 2) for take in signals]
-    assert effect.control != "time-reversed"
-    assert not effect.needs_time
+    assert effect.comparison.control != "time-reversed"
+    assert not effect.dynamics.needs_time
     every = control_columns(effect, signals, settings, shape, np.random.default_rng(5))
     some = control_columns(effect, signals, settings, shape, np.random.default_rng(5), rows)
     for whole, part, at in zip(every, some, rows, strict=True):
         np.testing.assert_array_equal(whole[at], part)
-    true = effect.columns_of_takes(signals, settings, shape)
-    thinned = effect.columns_of_takes(
+    true = effect.dynamics.columns_of_takes(signals, settings, shape)
+    thinned = effect.dynamics.columns_of_takes(
         [take.at(at) for take, at in zip(signals, rows, strict=True)], settings, shape
     )
     for whole, part, at in zip(true, thinned, rows, strict=True):

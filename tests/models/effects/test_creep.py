@@ -22,7 +22,7 @@ def stepped() -> Signals:
 
 def column(settings: dict, name: str) -> np.ndarray:
     columns = CREEP.columns(stepped(), settings, SHAPE)
-    return columns[:, 0, CREEP.weight_names(settings).index(name)]
+    return columns[:, 0, CREEP.weights(settings).names.index(name)]
 
 
 def time_constant_s(settings: dict) -> float:
@@ -32,20 +32,20 @@ def time_constant_s(settings: dict) -> float:
 
 
 def test_creep_learns_no_relaxation_as_fast_as_a_lag():
-    assert time_constant_s(CREEP.fit_repair_constants([stepped()])) == pytest.approx(FASTEST_S, abs=0.03)
+    assert time_constant_s(CREEP.further.constants(CREEP, [stepped()])) == pytest.approx(FASTEST_S, abs=0.03)
 
 
 def test_a_model_stored_before_relaxes_as_it_did():
     settings = {
-        key: value for key, value in CREEP.fit_repair_constants([stepped()]).items() if key != "fastest_s"
+        key: value for key, value in CREEP.further.constants(CREEP, [stepped()]).items() if key != "fastest_s"
     }
     assert time_constant_s(settings) == pytest.approx(8.0 / 64, abs=0.03)
 
 
 def test_what_is_slower_than_a_take_is_expected_small_and_nothing_else():
-    settings = CREEP.fit_repair_constants([stepped()])
-    names, prior = CREEP.weight_names(settings), CREEP.prior_sd(settings)
+    settings = CREEP.further.constants(CREEP, [stepped()])
+    names, prior = CREEP.weights(settings).names, CREEP.weights(settings).prior_sd
     assert len(names) == len(prior) == CREEP.columns(stepped(), settings, SHAPE).shape[2]
     small = {name for name, sd in zip(names, prior, strict=True) if sd == SLOWEST_SD}
     assert small == {"share_of_4_slow_deg_per_deg", "start_of_4_slow_deg_per_deg"}
-    assert CREEP.prior_sd(CREEP.fit_constants([stepped()])).tolist() == [1.0] * 6
+    assert CREEP.weights(CREEP.fit_constants([stepped()])).prior_sd.tolist() == [1.0] * 6

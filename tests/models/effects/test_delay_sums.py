@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from glovecal_models.effects.delay.delay_grid import crossed_with, squared_beside
-from glovecal_models.effects.delay.row_filters import low_passed, running_sums, window_means
+from glovecal_models.effects.delay.moved_angles import low_passed, running_sums, window_means
 from glovecal_models.effects.sensor_fault.short_faults import straight_line
 
 

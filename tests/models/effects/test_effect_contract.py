@@ -12,11 +12,16 @@ import numpy as np
 import pytest
 
 from glovecal_models.effects.base.control import control_columns
-from glovecal_models.effects.base.effect import ColumnlessEffect, Effect
-from glovecal_models.effects.base.facts import Control, Kind, Settings, Stage
-from glovecal_models.effects.base.history_effect import HistoryEffect
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.catalogue import catalogue, stored_effect
+from glovecal_models.effects.base.effect import (
+    CorrectionEffect,
+    Effect,
+    FurtherColumns,
+    described,
+    unavailable_inputs,
+)
+from glovecal_models.effects.base.facts import Control
+from glovecal_models.effects.base.signals import Settings, Signals
+from glovecal_models.effects.catalogue import catalogue, stored_correction
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect
 from glovecal_models.errors import BadInput
 
@@ -33,9 +38,9 @@ DECLARED = [
         "parameter rate s 5 50; parameter power 1 0.5 2"
     ),
 ]
-EFFECTS = [*catalogue().values(), *DECLARED]
-WITH_COLUMNS = [item for item in EFFECTS if not isinstance(item, ColumnlessEffect)]
-REPAIRED = [item for item in EFFECTS if type(item).fit_repair_constants is not Effect.fit_repair_constants]
+EVERY = [*catalogue().values(), *DECLARED]
+EFFECTS = [item for item in EVERY if isinstance(item, CorrectionEffect)]
+FURTHER = [item for item in EFFECTS if type(item.further).constants is not FurtherColumns.constants]
 FIXED_NAMES = [
     "nonlinearity", "cross_coupling", "palm_arch", "hysteresis", "creep", "lag", "clock_offset",
     "glove_latency", "repeated_samples", "warmup_drift", "temperature", "humidity", "donning_shift",
@@ -45,12 +50,16 @@ UNIT = re.compile(r"_(deg|s|ppm|1)(?=$|[_\[])|_per_")
 
 
 @pytest.fixture(params=EFFECTS, ids=lambda effect: effect.name)
-def effect(request: pytest.FixtureRequest) -> Effect:
+def effect(request: pytest.FixtureRequest) -> CorrectionEffect:
     return request.param
 
 
+def correction(name: str) -> CorrectionEffect:
+    return stored_correction(name, {})
+
+
 @pytest.fixture
-def settings(effect: Effect, signals: list[Signals]) -> Settings:
+def settings(effect: CorrectionEffect, signals: list[Signals]) -> Settings:
     """Settings as a stored model holds them."""
     return json.loads(json.dumps(effect.fit_constants(signals)))
 
@@ -91,43 +100,42 @@ def test_the_fixed_names_are_all_there() -> None:
     assert set(FIXED_NAMES) | {"no_effect"} == set(catalogue())
 
 
+@pytest.mark.parametrize("effect", EVERY, ids=lambda effect: effect.name)
 def test_it_says_what_it_is(effect: Effect) -> None:
     assert re.match(r"[a-z][a-z0-9_-]+\Z", effect.name)
-    assert effect.explanation[0].isupper()
-    assert effect.explanation.endswith(".")
-    assert "\n" not in effect.explanation
-    assert effect.source
-    assert effect.control in get_args(Control)
-    assert effect.kind in get_args(Kind)
-    assert effect.stage in get_args(Stage)
-    assert effect.has_columns == (effect.kind == "correction")
-    names = {*effect.alike, *effect.alike_between_levels, *effect.also_explained_by}
-    assert names | {item.effect for item in effect.rivals} <= set(catalogue())
-    for parameter in effect.parameters:
+    about = effect.about
+    assert about.explanation[0].isupper()
+    assert about.explanation.endswith(".")
+    assert "\n" not in about.explanation
+    assert about.source
+    assert effect.comparison is None or effect.comparison.control in get_args(Control)
+    for parameter in effect.shape.parameters:
         assert parameter.low < parameter.high
         assert parameter.unit
         assert parameter.prior
 
 
-def test_the_examples_can_be_judged(effect: Effect, signals: list[Signals]) -> None:
+def test_the_examples_can_be_judged(effect: CorrectionEffect, signals: list[Signals]) -> None:
     assert effect.not_applicable_reason(signals) is None
 
 
-def test_shapes_are_within_the_declared_ranges(effect: Effect, signals: list[Signals], settings: Any) -> None:
-    grid = effect.grid(signals, settings)
+def test_shapes_are_within_the_declared_ranges(
+    effect: CorrectionEffect, signals: list[Signals], settings: Any
+) -> None:
+    grid = effect.shape.grid(signals, settings)
     assert grid.ndim == 3
     assert len(grid) >= 1
-    assert grid.shape[1:] == (signals[0].own.shape[1], len(effect.parameters))
-    for column, parameter in enumerate(effect.parameters):
+    assert grid.shape[1:] == (signals[0].own.shape[1], len(effect.shape.parameters))
+    for column, parameter in enumerate(effect.shape.parameters):
         assert (grid[:, :, column] >= parameter.low - 1e-12).all()
         assert (grid[:, :, column] <= parameter.high + 1e-12).all()
 
 
 def test_columns_are_finite_repeatable_and_of_the_right_shape(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
-    names = effect.weight_names(settings)
-    for shape in effect.grid(signals, settings):
+    names = effect.weights(settings).names
+    for shape in effect.shape.grid(signals, settings):
         for take in signals:
             columns = effect.columns(take, settings, shape)
             assert columns.shape == (len(take), take.own.shape[1], len(names))
@@ -136,29 +144,35 @@ def test_columns_are_finite_repeatable_and_of_the_right_shape(
             assert not (columns @ np.zeros(len(names))).any()
 
 
-def test_settings_survive_being_stored(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+def test_settings_survive_being_stored(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
     fresh = effect.fit_constants(signals)
-    shape = effect.grid(signals, fresh)[-1]
+    shape = effect.shape.grid(signals, fresh)[-1]
     expected = effect.columns(signals[0], fresh, shape)
-    again = stored_effect(effect.name, settings)
+    again = stored_correction(effect.name, settings)
     assert np.array_equal(again.columns(signals[0], settings, shape), expected)
-    assert again.weight_names(settings) == effect.weight_names(fresh)
+    assert again.weights(settings).names == effect.weights(fresh).names
 
 
-def test_lanes_do_not_know_each_other(effect: Effect, signals: list[Signals], settings: Settings) -> None:
-    shape = effect.grid(signals, settings)[-1]
+def test_lanes_do_not_know_each_other(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
+    shape = effect.shape.grid(signals, settings)[-1]
     together = effect.columns(signals[1], settings, shape)
     for lane in range(signals[0].own.shape[1]):
         alone = [one_lane(take, lane) for take in signals]
         own_settings = effect.fit_constants(alone)
-        own_shape = effect.grid(alone, own_settings)[-1]
+        own_shape = effect.shape.grid(alone, own_settings)[-1]
         np.testing.assert_allclose(own_shape, shape[lane : lane + 1], rtol=1e-12)
         found = effect.columns(alone[1], own_settings, own_shape)[:, 0]
         np.testing.assert_allclose(found, together[:, lane], rtol=1e-9, atol=1e-9)
 
 
-def test_several_shapes_at_once_are_lanes(effect: Effect, signals: list[Signals], settings: Settings) -> None:
-    take, grid = signals[0], effect.grid(signals, settings)[:3]
+def test_several_shapes_at_once_are_lanes(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
+    take, grid = signals[0], effect.shape.grid(signals, settings)[:3]
     lanes = take.own.shape[1]
     wide = replace(take, own=np.tile(take.own, (1, len(grid))))
     together = effect.columns(wide, settings, np.concatenate(list(grid)))
@@ -168,7 +182,7 @@ def test_several_shapes_at_once_are_lanes(effect: Effect, signals: list[Signals]
 
 
 def test_settings_of_other_lanes_are_refused(signals: list[Signals]) -> None:
-    effect = catalogue()["nonlinearity"]
+    effect = correction("nonlinearity")
     settings = effect.fit_constants(signals)
     with pytest.raises(BadInput, match="settings of 3 lanes were given signals of 1"):
         effect.columns(one_lane(signals[0], 0), settings, np.zeros((1, 0)))
@@ -183,33 +197,39 @@ def with_gaps(take: Signals) -> Signals:
     return replace(take, time_s=time)
 
 
-def test_all_takes_together_are_each_take(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+def test_all_takes_together_are_each_take(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
     takes = [*signals, with_gaps(signals[0]), first_frames(signals[1], 1)]
-    shape = effect.grid(signals, settings)[-1]
-    for take, found in zip(takes, effect.columns_of_takes(takes, settings, shape), strict=True):
+    shape = effect.shape.grid(signals, settings)[-1]
+    for take, found in zip(takes, effect.dynamics.columns_of_takes(takes, settings, shape), strict=True):
         assert np.array_equal(found, effect.columns(take, settings, shape))
 
 
-@pytest.mark.parametrize("repaired", REPAIRED, ids=lambda effect: effect.name)
-def test_columns_of_a_repair_keep_the_promises_too(repaired: Effect, signals: list[Signals]) -> None:
-    settings = json.loads(json.dumps(repaired.fit_repair_constants(signals)))
-    shape, take = repaired.grid(signals, settings)[-1], with_gaps(signals[0])
+@pytest.mark.parametrize("repaired", FURTHER, ids=lambda effect: effect.name)
+def test_columns_of_a_repair_keep_the_promises_too(
+    repaired: CorrectionEffect, signals: list[Signals]
+) -> None:
+    settings = json.loads(json.dumps(repaired.further.constants(repaired, signals)))
+    shape, take = repaired.shape.grid(signals, settings)[-1], with_gaps(signals[0])
     columns = repaired.columns(take, settings, shape)
-    names = repaired.weight_names(settings)
-    assert columns.shape[2] == len(names) == len(repaired.prior_sd(settings)) == len(set(names))
-    assert set(names) - set(repaired.weight_names(repaired.fit_constants(signals)))
-    stream = repaired.stream(settings, shape)
+    names = repaired.weights(settings).names
+    assert columns.shape[2] == len(names) == len(repaired.weights(settings).prior_sd) == len(set(names))
+    assert set(names) - set(repaired.weights(repaired.fit_constants(signals)).names)
+    stream = repaired.dynamics.stream(settings, shape)
     live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])
     np.testing.assert_allclose(live, columns, rtol=0, atol=1e-9)
-    together = repaired.columns_of_takes([*signals, take], settings, shape)
+    together = repaired.dynamics.columns_of_takes([*signals, take], settings, shape)
     assert np.array_equal(together[-1], columns)
     assert np.array_equal(together[0], repaired.columns(signals[0], settings, shape))
 
 
-def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+def test_frame_by_frame_gives_the_same(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
     take = with_gaps(signals[0])
-    shape = effect.grid(signals, settings)[0]
-    stream = effect.stream(settings, shape)
+    shape = effect.shape.grid(signals, settings)[0]
+    stream = effect.dynamics.stream(settings, shape)
     live = np.concatenate([stream.columns(frame) for frame in each_frame(take)])
     np.testing.assert_allclose(live, effect.columns(take, settings, shape), rtol=0, atol=1e-9)
     stream.reset()
@@ -218,9 +238,11 @@ def test_frame_by_frame_gives_the_same(effect: Effect, signals: list[Signals], s
         np.testing.assert_allclose(again, live[:50], rtol=0, atol=1e-12)
 
 
-def test_later_frames_change_nothing(effect: Effect, signals: list[Signals], settings: Settings) -> None:
+def test_later_frames_change_nothing(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
     take = signals[0]
-    shape = effect.grid(signals, settings)[0]
+    shape = effect.shape.grid(signals, settings)[0]
     own = take.own.copy()
     own[700:] += 25.0
     others = {name: np.concatenate([values[:700], -values[700:]]) for name, values in take.others.items()}
@@ -228,11 +250,13 @@ def test_later_frames_change_nothing(effect: Effect, signals: list[Signals], set
     np.testing.assert_array_equal(changed[:700], effect.columns(take, settings, shape)[:700])
 
 
-@pytest.mark.parametrize("effect", [item for item in EFFECTS if item.has_memory], ids=lambda item: item.name)
+@pytest.mark.parametrize(
+    "effect", [item for item in EFFECTS if item.dynamics.has_memory], ids=lambda item: item.name
+)
 def test_after_a_long_gap_it_starts_afresh(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
-    shape = effect.grid(signals, settings)[-1]
+    shape = effect.shape.grid(signals, settings)[-1]
     take = first_frames(signals[0], 600)
     apart = replace(take, time_s=np.where(np.arange(600) >= 300, take.time_s + 1.5, take.time_s))
     second = joined(each_frame(apart)[300:])
@@ -241,14 +265,13 @@ def test_after_a_long_gap_it_starts_afresh(
     assert np.abs(found - effect.columns(take, settings, shape)[300:]).max() > 1e-6
 
 
-@pytest.mark.parametrize("effect", WITH_COLUMNS, ids=lambda item: item.name)
 def test_planted_weights_and_shape_come_back(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
     """The own columns as truth, noise of 0.3 deg on top: least squares finds weights and shape again."""
-    names = effect.weight_names(settings)
+    names = effect.weights(settings).names
     generator = np.random.default_rng(7)
-    grid = effect.grid(signals, settings)
+    grid = effect.shape.grid(signals, settings)
     truth = len(grid) // 2
     left, weights, errors = [], {}, {}
     planted = np.concatenate([effect.columns(take, settings, grid[truth])[:, 0] for take in signals])
@@ -264,11 +287,15 @@ def test_planted_weights_and_shape_come_back(
     assert (np.abs(weights[truth] - strength) < 5.0 * errors[truth]).all()
 
 
-def test_described_numbers_have_units(effect: Effect, signals: list[Signals], settings: Settings) -> None:
-    names = effect.weight_names(settings)
-    described = effect.described(settings, effect.grid(signals, settings)[0, 0], np.arange(float(len(names))))
-    assert len(described) == len(names) + len(effect.parameters)
-    for name, value in described.items():
+def test_described_numbers_have_units(
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
+) -> None:
+    names = effect.weights(settings).names
+    found = described(
+        effect, settings, effect.shape.grid(signals, settings)[0, 0], np.arange(float(len(names)))
+    )
+    assert len(found) == len(names) + len(effect.shape.parameters)
+    for name, value in found.items():
         assert isinstance(value, float)
         assert UNIT.search(name), name
 
@@ -282,7 +309,7 @@ def check_reason(reason: str | None) -> None:
     assert "None" not in reason
 
 
-def test_missing_context_is_said(effect: Effect, signals: list[Signals]) -> None:
+def test_missing_context_is_said(effect: CorrectionEffect, signals: list[Signals]) -> None:
     for name in effect.context:
         for value in (None, 3.0, np.nan):
             changed = []
@@ -311,17 +338,17 @@ def test_too_little_motion_is_said(signals: list[Signals]) -> None:
         "donning_shift",
         "creep",
     ):
-        check_reason(catalogue()[name].not_applicable_reason(brief))
+        check_reason(correction(name).not_applicable_reason(brief))
     rigid = [replace(take, others={"PALM_ARCH": np.zeros(len(take))}) for take in signals]
-    check_reason(catalogue()["palm_arch"].not_applicable_reason(rigid))
+    check_reason(correction("palm_arch").not_applicable_reason(rigid))
     alone = [replace(take, wearing=take.take) for take in signals]
-    check_reason(catalogue()["donning_shift"].not_applicable_reason(alone))
+    check_reason(correction("donning_shift").not_applicable_reason(alone))
 
 
 def test_the_twin_has_the_same_freedom_and_other_columns(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
-    shape = effect.grid(signals, settings)[0]
+    shape = effect.shape.grid(signals, settings)[0]
     true = [effect.columns(take, settings, shape) for take in signals]
     twin = control_columns(effect, signals, settings, shape, np.random.default_rng(3))
     assert [columns.shape for columns in twin] == [columns.shape for columns in true]
@@ -331,10 +358,10 @@ def test_the_twin_has_the_same_freedom_and_other_columns(
 
 
 def test_an_unknown_moment_does_not_spoil_the_rest(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
     """At serving, a column that is not sent or is unknown counts as usual: never NaN."""
-    shape = effect.grid(signals, settings)[0]
+    shape = effect.shape.grid(signals, settings)[0]
     bare = replace(signals[0], context={}, others={})
     unknown = replace(
         signals[0], context={name: np.full(len(v), np.nan) for name, v in signals[0].context.items()}
@@ -344,45 +371,50 @@ def test_an_unknown_moment_does_not_spoil_the_rest(
 
 
 def test_it_says_what_it_lacks_and_how_long_it_settles(
-    effect: Effect, signals: list[Signals], settings: Settings
+    effect: CorrectionEffect, signals: list[Signals], settings: Settings
 ) -> None:
     known = list(signals[0].context)
-    assert effect.unavailable_inputs(settings, known, signals[0].wearing) is None
+    assert unavailable_inputs(effect, settings, known, signals[0].wearing) is None
     if effect.context:
         assert (
-            effect.unavailable_inputs(settings, [], signals[0].wearing)
+            unavailable_inputs(effect, settings, [], signals[0].wearing)
             == f"context {effect.context[0]} is not sent"
         )
-    transient_s = effect.transient_s(effect.grid(signals, settings)[-1], settings)
-    assert (transient_s >= 1.0) == effect.has_memory
-    assert effect.needs_time or not effect.has_memory
-    assert effect.transient_s(np.zeros((0, len(effect.parameters))), settings) == 0.0
+    transient_s = effect.dynamics.transient_s(effect.shape.grid(signals, settings)[-1], settings)
+    assert (transient_s >= 1.0) == effect.dynamics.has_memory
+    assert effect.dynamics.needs_time or not effect.dynamics.has_memory
+    assert effect.dynamics.transient_s(np.zeros((0, len(effect.shape.parameters))), settings) == 0.0
 
 
 def test_a_wearing_without_a_name_and_an_unknown_one_are_told_apart(signals: list[Signals]) -> None:
-    shift = catalogue()["donning_shift"]
+    shift = correction("donning_shift")
     settings = shift.fit_constants(signals)
-    assert shift.unavailable_inputs(settings, [], "") == "nobody said which wearing this is"
-    assert shift.unavailable_inputs(settings, [], "z") == "wearing 'z' was not in training"
+    assert unavailable_inputs(shift, settings, [], "") == "nobody said which wearing this is"
+    assert unavailable_inputs(shift, settings, [], "z") == "wearing 'z' was not in training"
 
 
 def test_creep_settles_with_its_slow_part_and_time_itself_needs_times() -> None:
-    shapes, creep = np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]]), catalogue()["creep"]
-    assert creep.transient_s(shapes, {}) == 25.0
-    assert creep.transient_s(shapes, {"beside": [4.0, 1 / 64]}) == 100.0, "a slower relaxation stands beside"
-    assert catalogue()["lag"].transient_s(np.array([[0.05]]), {}) == 1.0
-    assert [effect.needs_time for effect in DECLARED] == [False, True, True]
-    assert [effect.has_memory for effect in DECLARED] == [False, True, False]
+    shapes, creep = np.array([[0.6, 2.5, 10.0], [1.6, 6.3, 25.0]]), correction("creep")
+    assert creep.dynamics.transient_s(shapes, {}) == 25.0
+    assert creep.dynamics.transient_s(shapes, {"beside": [4.0, 1 / 64]}) == 100.0, (
+        "a slower relaxation stands beside"
+    )
+    assert correction("lag").dynamics.transient_s(np.array([[0.05]]), {}) == 1.0
+    assert [effect.dynamics.needs_time for effect in DECLARED] == [False, True, True]
+    assert [effect.dynamics.has_memory for effect in DECLARED] == [False, True, False]
 
 
 def test_a_play_is_known_once_the_joint_has_moved_through_it_and_after_a_gap_anew() -> None:
     time = np.concatenate([np.arange(0, 4, 0.1), np.arange(9, 11, 0.1)])
     own = np.where(time < 1, 20.0, np.where(time < 9, 31.0, 40.0))[:, None]
-    play, creep = catalogue()["hysteresis"], catalogue()["creep"]
-    assert isinstance(play, HistoryEffect)
-    assert isinstance(creep, HistoryEffect)
+    play, creep = correction("hysteresis"), correction("creep")
     take = Signals(time, own)
-    assert play.unsettled(take, {}, np.array([[5.0]]))[:, 0].tolist() == ((time < 1) | (time >= 9)).tolist()
-    assert play.unsettled(take, {}, np.array([[6.0]])).all(), "twelve degrees wide, and eleven were moved"
-    slow = creep.unsettled(take, {}, np.array([[0.1, 0.5, 2.0]]))[:, 0]
-    assert slow.tolist() == ((time < 2) | ((time >= 9) & (time < 10.95))).tolist()
+
+    def unsettled(effect: CorrectionEffect, *shape: float) -> list[bool]:
+        found = effect.dynamics.unsettled(take, {}, np.array([shape]))
+        assert found is not None
+        return found[:, 0].tolist()
+
+    assert unsettled(play, 5.0) == ((time < 1) | (time >= 9)).tolist()
+    assert all(unsettled(play, 6.0)), "twelve degrees wide, and eleven were moved"
+    assert unsettled(creep, 0.1, 0.5, 2.0) == ((time < 2) | ((time >= 9) & (time < 10.95))).tolist()

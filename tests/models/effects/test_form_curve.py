@@ -23,7 +23,7 @@ def curves(count: int = 6000) -> tuple[LaneCurves, dict[str, np.ndarray], np.nda
 
 def test_a_curve_is_the_mean_in_each_bin_and_its_spread() -> None:
     found, inputs, degrees = curves()
-    over, own = found.curves
+    over, own = found.inputs
     assert (over.input, over.unit, own.input, own.unit) == ("I_MCP", "SD", OWN, "deg")
     assert len(over.at) == CURVE_BINS
     order = np.argsort(inputs["I_MCP"])

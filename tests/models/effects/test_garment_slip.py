@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from glovecal_models.effects.base.interval_effect import ClaimedErrors
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.base.findings import ClaimedErrors
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.effects.garment_slip.garment_slip import (
     GROWS_S,
     GarmentSlip,
@@ -17,7 +17,7 @@ from glovecal_models.effects.garment_slip.garment_slip import (
     SlipInterval,
     slip_growth,
 )
-from glovecal_models.effects.garment_slip.slip_pieces import slip_pieces
+from glovecal_models.effects.garment_slip.slip_components import slip_pieces
 from glovecal_models.effects.garment_slip.slip_rate import slip_rate
 from glovecal_models.takes.take import Take
 
@@ -135,7 +135,7 @@ def test_a_slip_may_be_behind_a_column_that_goes_along_by_chance(glove):
             for take, value in zip(takes, per_take, strict=True)
         ]
 
-    temperature, creep = effect("temperature"), effect("creep")
+    temperature, creep = stored_correction("temperature", {}), stored_correction("creep", {})
     assert SLIP.may_be_instead(temperature, warmed(chance), glove.sensor_of, errors)
     assert not SLIP.may_be_instead(temperature, warmed(means), glove.sensor_of, errors)
     assert not SLIP.may_be_instead(creep, warmed(chance), glove.sensor_of, errors)

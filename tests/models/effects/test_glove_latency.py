@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.text import diagnosis_sentences
-from glovecal_models.effects.base.signature_effect import Recorded
+from glovecal_models.effects.base.findings import Recorded
 from glovecal_models.effects.delay.clock_offset import ClockOffsetEffect
 from glovecal_models.effects.delay.glove_latency import GloveLatency
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
-from glovecal_models.takes.known_latency import KnownLatency
-from glovecal_models.takes.take import Take
+from glovecal_models.takes.take import KnownLatency, Take
 
 LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 DELAYS = [ClockOffsetEffect(), GloveLatency()]
@@ -115,4 +115,19 @@ def test_a_reference_whose_clock_is_not_found_is_left_out_and_named(late):
     assert any(f"The reference of take {takes[-1].name} is left out" in item for item in proposal.sentences)
     repaired = clock.repaired(takes, proposal.constants)
     assert [bool(np.isfinite(take.reference).any()) for take in repaired] == [True] * 5 + [False]
-    assert clock.described_constants(proposal.constants)["left_out"] == [takes[-1].name]
+    assert clock.described(proposal.constants)["left_out"] == [takes[-1].name]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("glove_latency", {"latency_s": 0.1}),
+        ("clock_offset", {"offset_s": {}, "common_s": 0.1, "per_take": False}),
+    ],
+)
+def test_a_model_that_repairs_its_clock_can_be_described(name, settings):
+    """Its parameters are of the measurement, not of a rotation."""
+    nothing = np.zeros((1, 0))
+    added = AddedEffect(name, ("I_PIP",), settings, nothing, nothing, np.zeros(1))
+    assert added.described() == {"I_PIP": {}}
+    assert added.transient_s == 0.0

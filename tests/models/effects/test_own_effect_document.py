@@ -62,7 +62,7 @@ def test_the_file_is_found_and_the_trial_prints_what_it_says(
 
 @pytest.mark.usefixtures("installed")
 def test_it_is_an_effect_like_the_others(signals: list[Signals]) -> None:
-    strap = catalogue_module.effect("strap_tension")
+    strap = catalogue_module.stored_correction("strap_tension", {})
     assert strap.not_applicable_reason(signals) == "no context column c.strap_n was recorded"
     generator = np.random.default_rng(0)
     takes = [
@@ -70,7 +70,7 @@ def test_it_is_an_effect_like_the_others(signals: list[Signals]) -> None:
         for take in signals
     ]
     settings = strap.fit_constants(takes)
-    shape = strap.grid(takes, settings)[0]
+    shape = strap.shape.grid(takes, settings)[0]
     twins = control_columns(strap, takes, settings, shape, generator)
     true = [strap.columns(take, settings, shape) for take in takes]
     assert all(not np.allclose(a, b) for a, b in zip(true, twins, strict=True))

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.interval_effect import ClaimedErrors
-from glovecal_models.effects.saturation.band_search import saturated_bands
-from glovecal_models.effects.saturation.saturated_band import SaturatedBand
+from glovecal_models.effects.base.findings import ClaimedErrors
+from glovecal_models.effects.saturation.saturated_band import SaturatedBand, saturated_bands
 from glovecal_models.effects.saturation.saturation import Saturation
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take

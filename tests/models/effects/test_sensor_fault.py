@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.effects.base.findings import Recorded, frames_inside
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.signature_effect import Recorded, frames_inside
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 from glovecal_models.layout import Layout
 
@@ -127,7 +127,7 @@ def coupled(counts, generator):
 
 def sticky(counts, generator):
     time = np.arange(len(counts)) / 60
-    plays = catalogue()["hysteresis"].columns(Signals(time, counts / 2), {}, np.full((3, 1), 10.0))
+    plays = stored_correction("hysteresis", {}).columns(Signals(time, counts / 2), {}, np.full((3, 1), 10.0))
     return counts + 2 * plays @ np.array([0.3, 0.3, 0.4])
 
 

@@ -7,14 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.effects.base.context_effect import FOLLOWS_S, ColumnStart, FollowedColumn, mean_slopes
 from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.slow_context_effect import (
-    FOLLOWS_S,
-    ColumnStart,
-    FollowedColumn,
-    mean_slopes,
-)
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.catalogue import stored_correction
 
 TIME = np.arange(0, 60, 0.04)
 USUAL = ColumnStart(noise=4e-4, slope=0.01, slope_sd=0.05, curvature_sd=2e-4)
@@ -84,7 +79,7 @@ def test_frame_by_frame_and_in_pieces_is_the_same():
 @pytest.mark.parametrize("name", SLOW)
 def test_a_sensor_that_follows_late_is_described(name: str):
     """What h - T dh/dt leaves after value and slope, against value alone."""
-    effect, generator, takes, felt = catalogue()[name], np.random.default_rng(1), [], []
+    effect, generator, takes, felt = stored_correction(name, {}), np.random.default_rng(1), [], []
     for _ in range(8):
         slope, start = generator.normal(0, 0.02), generator.uniform(40, 50)
         column = start + slope * TIME + generator.normal(0, 0.05, len(TIME))
@@ -99,4 +94,4 @@ def test_a_sensor_that_follows_late_is_described(name: str):
         return float(np.var(target - some @ np.linalg.lstsq(some, target, rcond=None)[0]) / np.var(target))
 
     assert left(columns[:, :4]) > 5 * left(columns)
-    assert effect.weight_names(settings)[-1].endswith(f"[c.{effect.context[0]}]_per_min")
+    assert effect.weights(settings).names[-1].endswith(f"[c.{effect.context[0]}]_per_min")

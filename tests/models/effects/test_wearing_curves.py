@@ -7,20 +7,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.base.wearing_curves import CURVES, WearingCurves, joined_curves
-from glovecal_models.effects.base.wearing_effect import with_checked_wearing
-from glovecal_models.effects.catalogue import catalogue
+from glovecal_models.effects.base.effect import CorrectionEffect, described
+from glovecal_models.effects.base.facts import Uncertainty
+from glovecal_models.effects.base.signals import Settings, Signals
+from glovecal_models.effects.base.wearing_effect import (
+    CURVES,
+    WearingCurves,
+    joined_curves,
+    with_checked_wearing,
+)
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.errors import BadInput
 
 WEARINGS = ("a", "b", "c")
 LANES = 2
 
 
-def shift() -> Effect:
-    return catalogue()["donning_shift"]
+def shift() -> CorrectionEffect:
+    return stored_correction("donning_shift", {})
+
+
+def uncertainty(settings: Settings, weights: np.ndarray, wearing: str) -> Uncertainty | None:
+    of_wearings = shift().weights(settings).of_wearings
+    assert of_wearings is not None
+    return of_wearings.uncertainty(weights, wearing)
 
 
 def take(wearing: str, seed: int = 0, frames: int = 300) -> Signals:
@@ -32,8 +42,8 @@ def with_curves() -> tuple[Settings, Settings, np.ndarray]:
     """Settings without and with curves, and weights for these."""
     takes = [take(name, seed) for seed, name in enumerate(WEARINGS)]
     plain = shift().fit_constants(takes)
-    curved = shift().settings_with_curves(takes, plain)[0]
-    count = len(shift().weight_names(curved))
+    curved = shift().further.choices(takes, plain)[0]
+    count = len(shift().weights(curved).names)
     return plain, curved, np.random.default_rng(1).normal(0, 1, (LANES, count))
 
 
@@ -45,8 +55,8 @@ def added(settings: Settings, weights: np.ndarray, wearing: str) -> np.ndarray:
 def test_without_curves_offset_and_gain_are_all() -> None:
     plain, curved, weights = with_curves()
     own = 2 * len(WEARINGS)
-    assert len(shift().weight_names(plain)) == own
-    np.testing.assert_array_equal(shift().prior_sd(curved)[:own], shift().prior_sd(plain))
+    assert len(shift().weights(plain).names) == own
+    np.testing.assert_array_equal(shift().weights(curved).prior_sd[:own], shift().weights(plain).prior_sd)
     without = weights.copy()
     without[:, own:] = 0.0
     for name in (*WEARINGS, "unknown"):
@@ -65,7 +75,7 @@ def test_what_all_wearings_share_is_not_theirs() -> None:
 
 def test_one_wearing_has_no_curve() -> None:
     alone = [take("a", 0), take("a", 1)]
-    assert not shift().settings_with_curves(alone, shift().fit_constants(alone))
+    assert not shift().further.choices(alone, shift().fit_constants(alone))
 
 
 def test_a_checked_wearing_leaves_the_others_as_they_were() -> None:
@@ -76,7 +86,11 @@ def test_a_checked_wearing_leaves_the_others_as_they_were() -> None:
         settings, weights = with_checked_wearing(
             settings, weights, "new", offset_and_gain, np.tile(np.eye(2), (LANES, 1, 1))
         )
-        assert weights.shape[1] == len(shift().weight_names(settings)) == len(shift().prior_sd(settings))
+        assert (
+            weights.shape[1]
+            == len(shift().weights(settings).names)
+            == len(shift().weights(settings).prior_sd)
+        )
         np.testing.assert_allclose(added(settings, weights, "new"), np.tile([3.0, -2.0], (300, 1)))
         for name in WEARINGS:
             np.testing.assert_allclose(added(settings, weights, name), before[name], atol=1e-12)
@@ -85,22 +99,22 @@ def test_a_checked_wearing_leaves_the_others_as_they_were() -> None:
 def test_an_unseen_wearing_claims_what_curves_differ_by() -> None:
     plain, curved, weights = with_curves()
     own, count = take("z", 7).own, 2 * len(WEARINGS)
-    narrow = shift().uncertainty(plain, weights[:, :count], "z")
-    wide = shift().uncertainty(curved, weights, "z")
+    narrow = uncertainty(plain, weights[:, :count], "z")
+    wide = uncertainty(curved, weights, "z")
     larger = weights.copy()
     larger[:, count:] *= 3
-    widest = shift().uncertainty(curved, larger, "z")
+    widest = uncertainty(curved, larger, "z")
     assert narrow is not None
     assert wide is not None
     assert widest is not None
     assert np.all(wide(own) > narrow(own))
     assert np.all(widest(own) > wide(own))
-    assert shift().uncertainty(curved, weights, "a") is None
+    assert uncertainty(curved, weights, "a") is None
 
 
 def test_a_reader_is_told_the_size_of_each_curve() -> None:
     _, curved, weights = with_curves()
-    numbers = shift().described(curved, np.zeros(0), weights[0])
+    numbers = described(shift(), curved, np.zeros(0), weights[0])
     assert [name for name in numbers if "curve" in name] == [f"curve_rms_deg[{name}]" for name in WEARINGS]
     assert min(numbers[f"curve_rms_deg[{name}]"] for name in WEARINGS) > 0
 

@@ -19,9 +19,6 @@ from glovecal_models.errors import Cancelled, LayoutMismatch, NotTrainable
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Rod, Touch
-from glovecal_models.inverse_kinematics.hand_shape import predicted_hand
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.guided_calibration import (
@@ -30,11 +27,12 @@ from glovecal_models.sampling.guided.guided_calibration import (
     guided_samples,
 )
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, TipChains, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import predicted_hand
 from glovecal_models.sampling.protocol import Protocol
 from glovecal_models.sampling.sampled_takes import sampled_takes
 from glovecal_models.simulation.protocol import evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.simulation.touching import touching_segment
 
 SEED, RATE_HZ = 2, 30.0

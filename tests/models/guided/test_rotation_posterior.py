@@ -12,7 +12,6 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Rod, Touch
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.labelled_takes import LabelledFrames
 from glovecal_models.sampling.guided.rotation_posterior import (
@@ -23,6 +22,7 @@ from glovecal_models.sampling.guided.rotation_posterior import (
     first_posteriors,
 )
 from glovecal_models.sampling.guided.touch_posterior import TouchFrames, TouchPosterior
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, Touch
 
 LAYOUT = Layout.built_in("cyberglove18")
 HAND = hand_skeleton(HandDimensions.from_measured({"hand_length": 182}))

@@ -11,14 +11,17 @@ from hypothesis.extra.numpy import arrays
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
-from glovecal_models.hand.rotations import ARCHING_ROTATIONS, HAND_ROTATIONS, PALM, WRIST, completed
-from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.hand.skeleton_document import skeleton_document
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.inverse_kinematics.contact import Touch
-from glovecal_models.inverse_kinematics.follow import follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.hand.rotations import (
+    ACTIVE_RANGE_DEG,
+    ARCHING_ROTATIONS,
+    HAND_ROTATIONS,
+    PALM,
+    WRIST,
+    completed,
+)
+from glovecal_models.hand.skeleton import hand_skeleton, skeleton_document
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import HandShape, follow
 
 SIZES = HandDimensions.from_measured({"hand_length": 182, "P_metacarpal": 80})
 RIGID = hand_skeleton(SIZES)

@@ -13,8 +13,7 @@ import pytest
 
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
-from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.hand.skeleton_document import skeleton_document
+from glovecal_models.hand.skeleton import hand_skeleton, skeleton_document
 
 
 def model_from(document: dict[str, Any]) -> mujoco.MjModel:

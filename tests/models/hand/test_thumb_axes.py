@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import HAND_ROTATIONS
-from glovecal_models.hand.skeleton import SENSOR_AXES, hand_skeleton
-from glovecal_models.hand.thumb_axes import ORDERS, PAPER_DEG, ThumbAxes
+from glovecal_models.hand.skeleton import ORDERS, PAPER_DEG, SENSOR_AXES, ThumbAxes, hand_skeleton
 
 ANGLE = st.floats(-80, 80)
 POSTURES = np.random.default_rng(6).uniform(0, 60, (5, len(HAND_ROTATIONS)))

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import pytest
 
-from glovecal_models.calibration.held_out_check import HeldOutErrors
+from glovecal_models.calibration.leave_out import HeldOutErrors
 from glovecal_models.improvement.addition import Addition
 from glovecal_models.improvement.text import addition_sentence
 
@@ -18,10 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 OF_DIAGNOSES = (
     "models/glovecal_models/diagnosis",
     "models/glovecal/_diagnosis.py",
-    "service/glovecal_service/report/diagnosis_pictures.py",
-    "service/glovecal_service/report/diagnosis_page.py",
-    "service/glovecal_service/views/diagnosis.py",
-    "service/glovecal_service/cli/effect/diagnosis.py",
+    "service/glovecal_service/questions/diagnose.py",
     "service/glovecal_service/studio/pages/diagnose.py",
     "service/glovecal_service/studio/findings",
 )

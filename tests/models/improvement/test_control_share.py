@@ -6,10 +6,9 @@ import pytest
 
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.effects.catalogue import effect
+from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.improvement.add_effect import add_effect
-from glovecal_models.improvement.addition import total_rmse_deg
-from glovecal_models.improvement.control_share import share_left_by_control
+from glovecal_models.improvement.addition import share_left_by_control, total_rmse_deg
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
@@ -43,7 +42,7 @@ def test_a_control_with_a_form_is_beaten_by_what_is_there(one_sided):
 
 def test_a_form_never_makes_the_control_look_worse(one_sided):
     takes, model = one_sided
-    coupling = effect("cross_coupling")
+    coupling = stored_correction("cross_coupling", {})
     plain = share_left_by_control(model, takes, coupling, SENSORS)
     formed = share_left_by_control(model, takes, coupling, SENSORS, known_share=plain, has_form=True)
     assert plain is not None

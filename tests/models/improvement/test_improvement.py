@@ -7,9 +7,8 @@ import pytest
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import requested_effects
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings, requested_effects
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.improvement.add_effect import add_effect

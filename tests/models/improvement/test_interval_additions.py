@@ -9,12 +9,11 @@ import pytest
 
 from glovecal_models.calibration.artifact import dump, load
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.model_recipe import trained_rotations
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings, trained_rotations
 from glovecal_models.comparison.compare import compare
 from glovecal_models.comparison.residuals import residuals
-from glovecal_models.effects.saturation.band_search import saturated_bands
+from glovecal_models.effects.saturation.saturated_band import saturated_bands
 from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.improvement.improve import improve
@@ -84,7 +83,7 @@ def test_a_slip_makes_long_sessions_claim_what_is_true():
         assert added.model.parent == "p"
         assert added.after == added.before, "the angles stay"
         assert added.claim is not None
-        assert added.claim.after.nlpd < added.claim.before.nlpd, "on held-out takes"
+        assert added.claim.nlpd_after < added.claim.nlpd_before, "on held-out takes"
         assert all(numbers["rate_deg_per_sqrt_min"] > 0 for numbers in added.parameters.values())
         long = [session.also("natural", 300.0, wearing).take for wearing in (2, 3)]
         pair = [compare(each, long).overall for each in (model, load(dump(added.model)))]

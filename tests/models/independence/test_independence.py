@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
-from glovecal_models.independence.independence import Independence, examine_independence
-from glovecal_models.independence.proposal import proposals, proposed_layout
-from glovecal_models.independence.still_rotation import moved_in_name, rotation_in_name
-from glovecal_models.independence.text import doubt_sentences, independence_sentences, proposal_sentence
+from glovecal_models.independence.answer import Independence
+from glovecal_models.independence.independence import examine_independence, proposed_layout
+from glovecal_models.independence.smooth_readings import moved_in_name, rotation_in_name
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -69,7 +68,7 @@ def test_shares_of_movements_that_overlap_are_those_of_the_pulls():
         found = both_ways(b, c).of("A")
         assert found is not None
         assert found.is_coupled
-        shares = {share.sensor: share for share in found.coupling.shares}
+        shares = {share.sensor: share for share in found.affecting}
         assert set(shares) == {"B", "C"}
         for name, curve in {"B": 0.3 * SWEEP, "C": 0.4 * (c.min() + np.ptp(c) * SWEEP) ** 2}.items():
             share = shares[name]
@@ -77,8 +76,8 @@ def test_shares_of_movements_that_overlap_are_those_of_the_pulls():
             assert share.std_pct == pytest.approx(std, abs=1.2)
             assert share.max_pct == pytest.approx(largest, abs=3.0)
             assert share.std_low < share.std_pct < share.std_high
-            assert share.affects
-        assert found.coupling.products
+            assert share.affects == "yes"
+        assert found.products
         target = 100 * coupled(b, c)
         assert found.std_pct == pytest.approx(target.std(), abs=0.7)
         assert found.max_pct == pytest.approx(np.abs(target - target.mean()).max(), abs=2.0)
@@ -88,11 +87,11 @@ def test_where_joints_hardly_move_apart_the_interval_is_wide_and_nothing_is_deci
     b, free = sweep(0.31), sweep(0.47)
     found = both_ways(b, 0.85 * b + 0.15 * free).of("A")
     assert found is not None
-    for share in found.coupling.shares:
-        assert share.affects is None
+    for share in found.affecting:
+        assert share.affects == "undecided"
         assert share.std_high > 2 * share.std_low
     true = 100 * (0.3 * SWEEP).std()
-    (of_b,) = (share for share in found.coupling.shares if share.sensor == "B")
+    (of_b,) = (share for share in found.affecting if share.sensor == "B")
     assert of_b.std_low < true < of_b.std_high
 
 
@@ -101,9 +100,9 @@ def test_a_coupling_is_one_way_and_becomes_a_proposal():
     back = found.of("B")
     assert back is not None
     assert not back.is_coupled
-    assert back.coupling.shares == ()
+    assert back.affecting == ()
     assert back.not_moved == ("D",)
-    offered = {item.rotation: item for item in proposals(found)}
+    offered = {item.rotation: item for item in found.proposals}
     assert (offered["A"].kind, set(offered["A"].sensors)) == ("MS1R", {"A", "B", "C"})
     assert offered["A"].is_sure
     assert (offered["B"].kind, offered["B"].is_change) == ("1S1R", False)
@@ -114,7 +113,7 @@ def test_a_coupling_is_one_way_and_becomes_a_proposal():
     assert layout.correspondence("B").sensors == ("B",)
     unchanged = proposed_layout(LAYOUT, tuple(offered.values()), "mine", only=["B"])
     assert unchanged.correspondence("A").sensors == ("A",)
-    with pytest.raises(BadInput, match="no proposal for C"):
+    with pytest.raises(BadInput, match="no proposal for 'C'"):
         proposed_layout(LAYOUT, tuple(offered.values()), "mine", only=["C"])
 
 
@@ -129,7 +128,7 @@ def test_a_sensor_pulled_along_is_no_cause():
     for rotation in ("A", "D"):
         item = found.of(rotation)
         assert item is not None
-        assert [(share.sensor, share.affects) for share in item.coupling.shares] == [("B", True)]
+        assert [(share.sensor, share.affects) for share in item.affecting] == [("B", "yes")]
 
 
 def test_joints_that_always_move_together_are_told_as_rivals():
@@ -137,15 +136,15 @@ def test_joints_that_always_move_together_are_told_as_rivals():
     found = examine_independence(LAYOUT, [recorded("still-A", {"B": b, "C": b}, A=0.3 * b)], RANGES)
     item = found.of("A")
     assert item is not None
-    (share,) = item.coupling.shares
-    assert share.affects is None
+    (share,) = item.affecting
+    assert share.affects == "undecided"
     assert {share.sensor, *share.rivals} == {"B", "C"}
-    assert any("is not identifiable" in doubt for doubt in doubt_sentences(item))
-    assert not proposals(found)[0].is_sure
+    assert any("is not identifiable" in doubt for doubt in item.doubts)
+    assert not found.proposals[0].is_sure
     apart = [recorded(f"still-A-move-{n}", {n: b}, A=0.3 * b if n == "B" else 0 * b) for n in ("B", "C")]
     told = examine_independence(LAYOUT, apart, RANGES).of("A")
     assert told is not None
-    assert [share.sensor for share in told.coupling.shares] == ["B"]
+    assert [share.sensor for share in told.affecting] == ["B"]
 
 
 def test_a_joint_that_was_not_still_is_seen():
@@ -154,17 +153,17 @@ def test_a_joint_that_was_not_still_is_seen():
         LAYOUT, [recorded("still-A", {"A": own, "B": b}, A=0.2 * b, measured=True)], RANGES
     ).of("A")
     assert measured is not None
-    assert measured.stillness is not None
-    assert not measured.stillness.is_still
-    assert "was not still" in doubt_sentences(measured)[0]
-    (share,) = measured.coupling.shares
+    assert measured.still is not None
+    assert not measured.still.is_still
+    assert "was not still" in measured.doubts[0]
+    (share,) = measured.affecting
     assert share.std_pct == pytest.approx(20 * SWEEP.std(), abs=0.7)
     assert measured.std_pct == pytest.approx(20 * b.std(), abs=0.7)
     unseen = examine_independence(LAYOUT, [recorded("still-A", {"A": own, "B": b}, A=0.2 * b)], RANGES).of(
         "A"
     )
     assert unseen is not None
-    assert "really kept still" in doubt_sentences(unseen)[0]
+    assert "really kept still" in unseen.doubts[0]
 
 
 def test_dead_sensors_and_ranges_that_were_not_seen():
@@ -175,13 +174,13 @@ def test_dead_sensors_and_ranges_that_were_not_seen():
     dead = Take("still-A", "w", SENSORS, TIME, silent)
     assert "A" in examine_independence(LAYOUT, [dead], RANGES[1:]).dead_sensors
     nothing = examine_independence(LAYOUT, [still])
-    assert nothing.rotations == ()
-    assert "record a take called range-A" in " ".join(independence_sentences(nothing))
+    assert not nothing.rotations
+    assert "record a take called range-A" in " ".join(nothing.sentences)
     with_counts = Layout.from_document(LAYOUT.to_document() | {"counts": [0, 255]})
     item = examine_independence(with_counts, [still]).of("A")
     assert item is not None
     assert item.active_range.source == "what the glove can send"
-    assert any("too small" in doubt for doubt in doubt_sentences(item))
+    assert any("too small" in doubt for doubt in item.doubts)
 
 
 def test_which_rotation_was_still_comes_from_names_angles_or_the_user():
@@ -227,8 +226,8 @@ def test_per_cents_do_not_depend_on_a_sensors_units(gain: list[float], zero: lis
     assert one is not None
     assert two is not None
     assert two.std_pct == pytest.approx(one.std_pct, rel=1e-6)
-    assert [share.sensor for share in two.coupling.shares] == ["C", "B"]
-    for first, second in zip(one.coupling.shares, two.coupling.shares, strict=True):
+    assert [share.sensor for share in two.affecting] == ["C", "B"]
+    for first, second in zip(one.affecting, two.affecting, strict=True):
         assert second.std_pct == pytest.approx(first.std_pct, rel=1e-3)
 
 
@@ -259,8 +258,8 @@ def test_any_take_is_examined_or_refused_in_a_sentence(
         take = dataclasses.replace(take, rotations=SENSORS, reference_time_s=time, reference=angles)
     for ranges in (RANGES, [take]):
         found = examine_independence(LAYOUT, [take], ranges)
-        assert len(found.rotations) + len(found.not_examined) == 1
-        figures = [(item.std_pct, item.max_pct, item.coupling.unexplained_pct) for item in found.rotations]
-        shares = [dataclasses.asdict(one) for item in found.rotations for one in item.coupling.shares]
+        assert len(found.rotations) == 1 or found.sentences
+        figures = [(item.std_pct, item.max_pct, item.unexplained_pct) for item in found.rotations]
+        shares = [dataclasses.asdict(one) for item in found.rotations for one in item.affecting]
         json.dumps([figures, shares], allow_nan=False)
-        assert all([*independence_sentences(found), *map(proposal_sentence, proposals(found))])
+        assert all([*found.sentences, *(item.sentence for item in found.proposals)])

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 from still_take import still_take
 
-from glovecal_models.independence.independence import SIDEWAYS, Independence, examine_independence
-from glovecal_models.independence.proposal import proposals
-from glovecal_models.independence.text import proposal_sentence, worn_side_sentence
+from glovecal_models.independence.answer import Independence, OneWay
+from glovecal_models.independence.independence import SIDEWAYS, examine_independence
 from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_models.simulation.stretch import TABLE_1
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
+from glovecal_models.simulation.simulated_hand import TABLE_1
 from glovecal_models.takes.take import Take
 
 EXAMINED = ("TI_ABD", "IM_ABD", "MR_ABD", "RP_ABD", "PALM_ARCH", "W_FLEX", "W_ABD")
@@ -42,22 +40,22 @@ def examined(glove: SimulatedGlove) -> Independence:
 
 def test_it_proposes_the_papers_correspondences(glove: SimulatedGlove, examined: Independence):
     """The built-in layout is the paper's Table 1; the thumb stays read from all its sensors."""
-    offered = {item.rotation: item for item in proposals(examined)}
+    offered = {item.rotation: item for item in examined.proposals}
     for rotation in (*EXAMINED, *INDEPENDENT):
         now = glove.layout.correspondence(rotation)
         assert offered[rotation].kind == now.kind
         assert set(offered[rotation].sensors) == set(now.sensors), rotation
         assert not offered[rotation].is_change
     assert offered["I_DIP"].kind == "0S1R"
-    assert "2/3 * I_PIP" in proposal_sentence(offered["I_DIP"])
-    assert "more accurate with all thumb sensors" in proposal_sentence(offered["T_TMC"])
-    assert ("I_MCP", "IM_ABD") in examined.one_way
+    assert "2/3 * I_PIP" in offered["I_DIP"].sentence
+    assert "more accurate with all thumb sensors" in offered["T_TMC"].sentence
+    assert OneWay("I_MCP", "IM_ABD") in examined.one_way
 
 
 def test_what_was_kept_still_by_the_hand_alone_is_still(examined: Independence):
     for item in examined.rotations:
-        assert item.stillness is not None
-        assert item.stillness.is_still
+        assert item.still is not None
+        assert item.still.is_still
         assert item.is_coupled == (item.rotation in EXAMINED)
 
 
@@ -82,7 +80,7 @@ def test_the_glove_of_the_other_hand_is_seen_and_how_sure_it_is(glove: Simulated
     assert set(other.reversed_sensors) <= set(SIDEWAYS)
     assert other.p_value is not None
     assert other.p_value < 1e-3
-    assert "looks the same" in worn_side_sentence(other)
+    assert "looks the same" in other.sentence
     assert worn(glove.sensors).verdict == "back to front"
     swapped = worn(("I_PIP",))
     assert swapped.verdict == "as it should be"

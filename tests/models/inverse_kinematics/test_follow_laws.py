@@ -13,10 +13,13 @@ from scipy.optimize import minimize
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Rod, TipPlaces, Touch
-from glovecal_models.inverse_kinematics.follow import LONGEST_PULL_MM, clamped_pull, follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, TipChains, TipPlaces, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import (
+    LONGEST_PULL_MM,
+    HandShape,
+    clamped_pull,
+    follow,
+)
 
 RIGHT, LEFT = hand_skeleton(), hand_skeleton(hand="left")
 MIRROR = np.array([1.0, -1.0, 1.0])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ik_samples import IkSamples, ik_samples
 
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.model import CalibrationModel
@@ -17,14 +18,10 @@ from glovecal_models.errors import BadInput, LayoutMismatch
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Rod, Touch
-from glovecal_models.inverse_kinematics.follow import follow
-from glovecal_models.inverse_kinematics.hand_shape import RULE_SD_DEG, predicted_hand
-from glovecal_models.inverse_kinematics.ik_samples import IkSamples, ik_samples
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, TipChains, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import RULE_SD_DEG, follow, predicted_hand
 from glovecal_models.simulation.protocol import evaluation_segment, key_pose_segment, sampling_protocol
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import SimulatedTake, simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, SimulatedTake, simulate_take
 from glovecal_models.simulation.touching import touching_segment
 from glovecal_models.takes.take import Take
 

@@ -8,9 +8,8 @@ from inverse_kinematics_bench import moving_shape
 from mink_hand import MinkHand
 
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Touch
-from glovecal_models.inverse_kinematics.follow import STILL_DEG, TIP_TOLERANCE_MM, follow
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import STILL_DEG, TIP_TOLERANCE_MM, follow
 
 
 @pytest.mark.parametrize("finger", list("IMR"))

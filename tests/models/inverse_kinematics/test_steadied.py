@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.inverse_kinematics.steadied import steadied
+from glovecal_models.sampling.inverse_kinematics.follow import steadied
 
 
 def test_parabolas_stay_and_noise_falls() -> None:

@@ -9,7 +9,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.forward_kinematics import forward_kinematics, tip_jacobian
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS, WRIST
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains
 
 
 @pytest.mark.parametrize("hand", ["right", "left"])

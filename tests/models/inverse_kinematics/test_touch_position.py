@@ -14,10 +14,13 @@ import pytest
 from scipy.optimize import minimize
 
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.inverse_kinematics.contact import TipPlaces, Touch
-from glovecal_models.inverse_kinematics.follow import TIP_TOLERANCE_MM, FollowedHands, follow
-from glovecal_models.inverse_kinematics.hand_shape import HandShape
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains, TipPlaces, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import (
+    TIP_TOLERANCE_MM,
+    FollowedHands,
+    HandShape,
+    follow,
+)
 
 SKELETON = hand_skeleton()
 UNREACHED = -1e6

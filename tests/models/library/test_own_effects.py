@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
 import pytest
 
 import glovecal
@@ -23,25 +22,21 @@ class Bend(glovecal.InstantEffect):
     """A square of the joint's angle."""
 
     name = "bend"
-    explanation = "The sensor bends."
-    source = "a test"
+    about = glovecal.About("The sensor bends.", source="a test")
 
     def fit_constants(self, takes):
         return glovecal.fit_joint_units(takes)
 
-    def grid(self, takes, settings):
-        return np.zeros((1, takes[0].own.shape[1], 0))
-
     def columns(self, take, settings, shape):
         return glovecal.in_joint_units(take.own, settings)[:, :, None] ** 2
 
-    def weight_names(self, settings):
-        return ("deg_per_square_sd",)
+    def weights(self, settings):
+        return glovecal.Weights(("deg_per_square_sd",))
 
 
 def test_a_line_of_text_is_tried_and_added(model, takes):
     found = glovecal.diagnose(model, takes, also=[OWN])
-    assert "stiffness" in [row[0] for row in found.table().rows]
+    assert "stiffness" in [item.effect for item in found.answer.candidates]
     addition = glovecal.add_effect(model, takes, OWN, rotations=["I_PIP"], samples=300)
     assert addition.effect == "stiffness"
     assert "stiffness" not in glovecal.effects(), "it belongs to the model, not to the catalogue"
@@ -54,7 +49,7 @@ def test_a_registered_class_is_an_effect_like_the_others(model, takes):
     assert "bend" not in glovecal.effects()
     assert glovecal.register_effect(Bend) is Bend
     assert isinstance(glovecal.effects()["bend"], Bend)
-    assert "bend" in [row[0] for row in glovecal.diagnose(model, takes).table().rows]
+    assert "bend" in [item.effect for item in glovecal.diagnose(model, takes).answer.candidates]
     glovecal.register_effect(Bend())  # a cell that runs again
 
 

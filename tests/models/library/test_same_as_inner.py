@@ -38,7 +38,12 @@ def same(ours, theirs) -> bool:
 
 
 def alike(ours, theirs) -> bool:
-    return repr(ours) == repr(theirs)
+    """But for what was asked about, which only the library's caller knows."""
+    asked = {"subject", "model", "method", "title", "takes", "simulated"}
+    first, second = (
+        {name: value for name, value in vars(one).items() if name not in asked} for one in (ours, theirs)
+    )
+    return repr(first) == repr(second)
 
 
 def test_simulate(session):
@@ -74,9 +79,9 @@ def test_train(model, session, takes):
 
 
 def test_compare_and_where(model, takes):
-    assert alike(glovecal.compare(model, takes).inner, compare(model.inner, takes))
+    assert alike(glovecal.compare(model, takes), compare(model.inner, takes))
     theirs = where_it_fails(residuals(model.inner, takes), seed=3)
-    assert alike(glovecal.where(model, takes, seed=3).inner, theirs)
+    assert alike(glovecal.where(model, takes, seed=3), theirs)
 
 
 def test_fingertips_of_a_whole_glove():
@@ -84,9 +89,9 @@ def test_fingertips_of_a_whole_glove():
     model = glovecal.train(session.takes, layout=session.layout, method="linear", folds=0)
     ours = glovecal.compare(model, session.takes, hand_length_mm=180.0)
     hand = HandDimensions.from_measured({"hand_length": 180.0})
-    assert alike(ours.inner, compare(model.inner, session.takes, dimensions=hand))
+    assert alike(ours, compare(model.inner, session.takes, dimensions=hand))
     assert ours.fingertip_rmse_mm is not None
-    assert "mm (RMSE), for a hand length of 180 mm." in str(ours)
+    assert "mm (RMSE, for a hand of 180 mm" in str(ours)
     with pytest.raises(glovecal.BadInput):
         glovecal.compare(model, session.takes, hand_length_mm=18.0)
 

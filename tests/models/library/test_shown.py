@@ -22,11 +22,8 @@ TABLE = Table.of(
 
 
 @pytest.fixture
-def results(session, model, takes, diagnosis, addition, improvement):
-    return [
-        session, takes, model, glovecal.compare(model, takes), glovecal.where(model, takes), diagnosis,
-        addition, improvement, glovecal.predict(model, takes[0]), glovecal.effects(),
-    ]  # fmt: skip
+def results(session, model, takes):
+    return [session, takes, model, glovecal.predict(model, takes[0]), glovecal.effects()]
 
 
 def test_the_text_is_a_table():
@@ -73,6 +70,43 @@ def test_every_result_shows_the_same_columns_everywhere(results):
             assert f">{name}</th>" in result._repr_html_()
 
 
+def test_what_changed_a_model_is_printed_and_shown_with_its_pictures(addition, improvement):
+    for result, there in ((addition, addition.sentence), (improvement, "hysteresis on I_PIP")):
+        assert str(result) == repr(result)
+        assert there in str(result)
+        assert there in result._repr_html_()
+        assert ("<svg" in result._repr_html_()) is (find_spec("matplotlib") is not None)
+    if find_spec("pandas") is not None:
+        frame = addition.to_frame()
+        assert list(frame["rotation"]) == ["I_PIP"]
+        assert frame["after_rmse_deg"][0] < frame["before_rmse_deg"][0]
+        assert list(improvement.to_frame()["rmse_deg"]) == [*improvement.rmse_deg]
+
+
+def test_an_answer_is_printed_and_shown_with_its_pictures(model, takes, diagnosis):
+    compared, failures = glovecal.compare(model, takes), glovecal.where(model, takes)
+    found = (compared, "NLPD"), (failures, failures.rotations[0].sentence), (diagnosis, "is missing")
+    for result, there in found:
+        assert str(result) == repr(result)
+        assert there in str(result)
+        assert there in result._repr_html_()
+        assert ("<svg" in result._repr_html_()) is (find_spec("matplotlib") is not None)
+    if find_spec("pandas") is not None:
+        frame = compared.to_frame()
+        assert list(frame["rotation"]) == [*compared.rotations, "all rotations"]
+        assert list(frame["rmse_deg"]) == [*compared.per_rotation_deg.values(), compared.rmse_deg]
+        assert list(failures.to_frame()["rotation"]) == [item.rotation for item in failures.rotations]
+        tried = diagnosis.to_frame()
+        assert list(tried.columns) == [
+            *("effect", "rotations", "rmse_deg", "with_effect_rmse_deg", "with_control_rmse_deg"),
+            *("p_value", "significant"),
+        ]
+        assert list(tried["effect"]) == [item.effect for item in diagnosis.inner.ranked_assessments]
+        assert list(tried["rmse_deg"]) == [
+            item.rmse_deg.before for item in diagnosis.inner.ranked_assessments
+        ]
+
+
 def test_a_frame_or_the_sentence(results):
     for result in results:
         if find_spec("pandas") is None:
@@ -108,7 +142,9 @@ def test_pictures_give_their_axes_back(model, takes, diagnosis, addition, improv
         assert ax.get_xlabel()
         assert ax.get_legend() is not None
     assert widths(comparison.plot()) == pytest.approx([*comparison.per_rotation_deg.values()])
-    assert widths(improvement.plot())[-2:] == pytest.approx(improvement.rmse_deg)
+    assert [bar.get_height() for bar in improvement.plot().containers[0]][-2:] == pytest.approx(
+        improvement.rmse_deg
+    )
     assert failures.plot("I_MCP", "speed").get_xlabel() == "speed (deg/s)"
     assert angles.plot(["I_PIP"]).get_legend_handles_labels()[1] == ["I_PIP"]
 

@@ -9,9 +9,12 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from glovecal_models.covariance.base import Covariance, restore_covariance
-from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.polynomial import Polynomial
-from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
+from glovecal_models.covariance.functions import (
+    LinearArd,
+    Polynomial,
+    SquaredExponential,
+    SquaredExponentialArd,
+)
 from glovecal_models.errors import DamagedArtifact
 
 EVERY = [

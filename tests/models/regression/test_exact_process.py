@@ -10,13 +10,16 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.linear_ard import LinearArd
-from glovecal_models.covariance.polynomial import Polynomial
-from glovecal_models.covariance.squared_exponential import SquaredExponential, SquaredExponentialArd
+from glovecal_models.covariance.functions import (
+    LinearArd,
+    Polynomial,
+    SquaredExponential,
+    SquaredExponentialArd,
+)
 from glovecal_models.errors import Cancelled, NotTrainable
 from glovecal_models.regression.exact import ExactLikelihood, fit_exact
-from glovecal_models.regression.mean import LinearMean, Mean, ZeroMean
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.linear_regressor import LinearMean, Mean, ZeroMean
+from glovecal_models.regression.regressor import ProcessRegressor
 
 NINE_MODELS = {
     "m0 RBF": lambda s, r: fit_exact(s, r, ZeroMean(), SquaredExponential()),

@@ -1,22 +1,21 @@
 """Processes with any kernel on merged and weighted samples: against scikit-learn and dense formulas."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, DotProduct, Kernel, WhiteKernel
 
 from glovecal_models.covariance.base import Covariance
-from glovecal_models.covariance.polynomial import Polynomial
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import Polynomial, SquaredExponentialArd
 from glovecal_models.errors import Cancelled, NotTrainable
-from glovecal_models.regression.counted_likelihood import CountedLikelihood
-from glovecal_models.regression.exact import ExactLikelihood
+from glovecal_models.regression.exact import CountedLikelihood, ExactLikelihood
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.kernel_candidates import fit_process
-from glovecal_models.regression.mean import LinearMean, ZeroMean
-from glovecal_models.regression.merged_samples import MergedSamples
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.training_samples import standardise
+from glovecal_models.regression.kernel_candidates import KernelCandidate
+from glovecal_models.regression.linear_regressor import LinearMean, Mean, ZeroMean
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.regression.training_samples import MergedSamples, standardise
 
 POLYNOMIAL = Polynomial(3)
 GENERAL = SquaredExponentialArd() + SquaredExponentialArd()
@@ -28,6 +27,12 @@ def cubic(count: int = 120, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     share = random.uniform(size=(count, 2))
     angle = 60 * share[:, 0] ** 3 + 40 * share[:, 0] * share[:, 1] - 20 * share[:, 1] ** 2
     return np.round(40 + 180 * share), angle + random.normal(scale=0.7, size=count)
+
+
+def fit_process(
+    inputs: np.ndarray, target: np.ndarray, mean: Mean, covariance: Covariance, method: str, **search: Any
+) -> ProcessRegressor:
+    return KernelCandidate("tried", "a tried kernel", method, mean, covariance).fit(inputs, target, **search)
 
 
 def theirs(process: ProcessRegressor) -> GaussianProcessRegressor:

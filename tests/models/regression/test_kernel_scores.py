@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glovecal_models.covariance.polynomial import Polynomial
+from glovecal_models.covariance.functions import Polynomial
 from glovecal_models.errors import DamagedArtifact
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.kernel_candidates import CANDIDATE, CANDIDATES, candidates_of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import cholesky, solve_triangular
 
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 
 
 def exact_process(samples: int = 30, dimensions: int = 2) -> tuple[ProcessRegressor, np.ndarray, np.ndarray]:

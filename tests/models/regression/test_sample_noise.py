@@ -11,18 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from glovecal_models.calibration.sample_weight import Recorded, fit_weighted
-from glovecal_models.errors import NotTrainable
-from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
-from glovecal_models.regression.fast_lmc import fit_lmc_gpr
-from glovecal_models.regression.linear_regressor import fit_linear
-from glovecal_models.regression.merged_samples import MergedSamples
-from glovecal_models.regression.process_regressor import ProcessRegressor
-from glovecal_models.regression.sample_noise import (
+from glovecal_models.calibration.sample_weight import (
+    Recorded,
     fit_linear_with_variance,
+    fit_weighted,
     sample_noise,
     with_stated_variance,
 )
+from glovecal_models.errors import NotTrainable
+from glovecal_models.regression.fast_lmc import fit_lmc_gpr
+from glovecal_models.regression.linear_regressor import fit_linear
+from glovecal_models.regression.profiled_likelihood import ExactProfiledLikelihood
+from glovecal_models.regression.regressor import ProcessRegressor
+from glovecal_models.regression.training_samples import MergedSamples
 
 
 def samples(count: int = 160, dimensions: int = 2, seed: int = 0, own_deg: float = 1.0):

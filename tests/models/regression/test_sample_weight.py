@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
-from glovecal_models.regression.exact_profiled_likelihood import ExactProfiledLikelihood
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.regression.fast_lmc import fit_lmc_gpr
 from glovecal_models.regression.fitc import FitcLikelihood
-from glovecal_models.regression.low_rank_likelihood import LowRankLikelihood
-from glovecal_models.regression.mean import LinearMean
-from glovecal_models.regression.merged_samples import MergedSamples
+from glovecal_models.regression.linear_regressor import LinearMean
+from glovecal_models.regression.profiled_likelihood import ExactProfiledLikelihood, LowRankLikelihood
 from glovecal_models.regression.spgp import fit_spgp
+from glovecal_models.regression.training_samples import MergedSamples
 
 
 def made_up(count: int, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:

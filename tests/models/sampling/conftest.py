@@ -9,8 +9,7 @@ import pytest
 
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.protocol import Protocol, Step
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.state import GloveReading, SamplingState
 
 RATE_HZ = 50
 STILL = (100.0, 50.0)

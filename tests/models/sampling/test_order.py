@@ -10,14 +10,11 @@ import pytest
 from asked_session import RECORDING, asked_session
 
 from glovecal_models.layout import Layout
-from glovecal_models.sampling.catalogue import make_protocol
+from glovecal_models.sampling.catalogue import REPEAT_PART, SHUFFLED, in_random_order, make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
-from glovecal_models.sampling.order import REPEAT_PART, SHUFFLED, in_random_order
 from glovecal_models.sampling.protocol import Protocol
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.repeatability import repeatability
-from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.sampled_takes import repeatability, sampled_takes
+from glovecal_models.sampling.state import GloveReading, SamplingState
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 
 LAYOUT = Layout.built_in("cyberglove18")

@@ -16,12 +16,10 @@ from glovecal_models.layout import Layout
 from glovecal_models.quick_check.quick_check import quick_check
 from glovecal_models.sampling.catalogue import PROTOCOLS, Equipment, make_protocol
 from glovecal_models.sampling.protocol import Protocol, Step
-from glovecal_models.sampling.reading import GloveReading
 from glovecal_models.sampling.sampled_takes import for_other_subject, sampled_takes
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.state import GloveReading, SamplingState
 from glovecal_models.simulation.protocol import evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 
 LAYOUT = Layout.built_in("cyberglove18")
 
@@ -220,4 +218,4 @@ def test_the_second_wearing_is_a_quick_check(session: AskedSession) -> None:
     assert worn.state.capture_s <= 30
     checks = [each.take for each in sampled_takes(worn.state, {RECORDING: worn.take}, name="c")]
     found = quick_check(model, [take for take in checks if take.poses])
-    assert {pose.label for pose in found.poses}
+    assert {pose.pose for pose in found.report.poses}

@@ -11,11 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
-from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.sampling.engine import EVENTS, NotNow, Sampling, begin_sampling
 from glovecal_models.sampling.protocol import Protocol
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import SamplingState
-from glovecal_models.sampling.user_events import EVENTS, NotNow
+from glovecal_models.sampling.state import GloveReading, SamplingState
 
 from .conftest import STEPS, STILL, Bench, moving
 

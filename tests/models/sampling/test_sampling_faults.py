@@ -7,11 +7,9 @@ import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_models.sampling.catalogue import rod_step, touch_steps
-from glovecal_models.sampling.protocol import Step
-from glovecal_models.sampling.quality import faults
-from glovecal_models.sampling.reading import ActiveRanges, GloveReading
-from glovecal_models.sampling.steps import widget_step
-from glovecal_models.sampling.verdict import inconsistent_widgets
+from glovecal_models.sampling.protocol import Step, widget_step
+from glovecal_models.sampling.state import ActiveRanges, GloveReading
+from glovecal_models.sampling.verdict import faults, inconsistent_widgets
 
 from .conftest import STEPS, Bench, moving, pose
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from glovecal_models.hand.forward_kinematics import forward_kinematics
-from glovecal_models.hand.rotations import FINGERS, completed
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, FINGERS, completed
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.protocol import Step

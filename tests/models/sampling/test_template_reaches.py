@@ -15,8 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 from template_calibration import of_template
 
 
-@pytest.mark.parametrize("glove", [24, 29])
-@pytest.mark.parametrize("law", ["closing", "squared"])
+@pytest.mark.parametrize(("glove", "law"), [(24, "closing"), (29, "squared")])
 def test_five_shapes_reach_five_degrees_and_the_palm_closes_the_touch(glove: int, law: str) -> None:
     row = {name: float(str(value)) for name, value in of_template(glove, law).items() if "worst" not in name}
     assert row["with_mean_deg"] <= 5.0

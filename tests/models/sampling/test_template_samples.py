@@ -13,15 +13,24 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.errors import NotTrainable
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
-from glovecal_models.inverse_kinematics.contact import Touch
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.inverse_kinematics.contact import Touch
 from glovecal_models.sampling.sampled_takes import sampled_takes
-from glovecal_models.sampling.template.equations import TemplateEquations, equations_for
-from glovecal_models.sampling.template.initialisation import TouchConditions, initialised
-from glovecal_models.sampling.template.observations import Observation
-from glovecal_models.sampling.template.shapes import SHAPES, KnownAngle, shape_angles, touching_angles
+from glovecal_models.sampling.shown_hands import (
+    SHAPES,
+    KnownAngle,
+    Observation,
+    shape_angles,
+    touching_angles,
+)
+from glovecal_models.sampling.template.initialisation import (
+    TemplateEquations,
+    TouchConditions,
+    equations_for,
+    initialised,
+)
 from glovecal_models.sampling.template.template_samples import template_calibration, template_samples
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 

@@ -10,8 +10,7 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.scene import play_scene
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_glove import SessionGlove
-from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan
-from glovecal_models.simulation.session_schedule import schedule
+from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan, schedule
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes

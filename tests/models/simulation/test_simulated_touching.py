@@ -10,7 +10,7 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.simulation.hand_motion import within_range
+from glovecal_models.simulation.protocol import within_range
 from glovecal_models.simulation.simulated_hand import DRIVEN, ROTATIONS, SimulatedHand
 from glovecal_models.simulation.touching import touching_segment
 

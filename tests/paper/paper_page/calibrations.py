@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glovecal_service.report.drawing import FLOOR, MODEL, QUIET
+from glovecal_models.presentation.drawing import FLOOR, MODEL, QUIET
 
 CALIBRATION_NAMES = {"raw": "raw", "linear": "linear", "lmc_gpr": "LMC-GPR", "spgp": "SPGP 100"}
 COLOURS = {"raw": QUIET, "linear": FLOOR, "lmc_gpr": MODEL, "spgp": "#3f9c6b"}

@@ -9,10 +9,10 @@ from colour_glove_chain import ChainRow, DepthRow
 from colour_glove_motion import MotionRow
 from colour_glove_scene import HANDS
 from matplotlib.figure import Figure
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Demand
 
-from glovecal_service.report.drawing import FLOOR, MODEL, QUIET, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import FLOOR, MODEL, QUIET
 
 MUST = {
     (1, HANDS[0], "ik"): 7.0,

@@ -18,10 +18,10 @@ from colour_glove_chain import ChainRow, DepthRow
 from colour_glove_motion import MotionRow
 from matplotlib.figure import Figure
 from paper_page.colour_glove_poses_section import poses_parts
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Demand, Section
 
-from glovecal_service.report.drawing import FLOOR, MODEL, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import FLOOR, MODEL
 
 COVERAGE_HEADS = (
     *("entries", "sampling", "nearest in pose, mm", "nearest in image, px²"),

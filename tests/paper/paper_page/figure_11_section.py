@@ -8,11 +8,11 @@ import numpy as np
 from figure_11 import Figure11Row
 from matplotlib.figure import Figure
 from paper_page.calibrations import CALIBRATION_NAMES, COLOURS
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Demand, Section
 from paper_subject import Curve
 
-from glovecal_service.report.drawing import MEASURED, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import MEASURED
 
 HEADS = ("held at", "wearing", "calibration", "|bias|", "sd", "sd offline", "must reach: bias", "sd")
 NOTE = (

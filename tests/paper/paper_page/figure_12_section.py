@@ -9,11 +9,11 @@ from figure_12 import Figure12Row
 from matplotlib.figure import Figure
 from paper_page.beside import number
 from paper_page.calibrations import CALIBRATION_NAMES, COLOURS
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Demand, Section
 
 from glovecal_models.hand.rotations import FINGERS
-from glovecal_service.report.drawing import MEASURED, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import MEASURED
 
 HEADS = ("thumb and", "wearing", "calibration", "paper", "ours", "ours, offline", "must reach")
 AT_MOST_CM = {"lmc_gpr": 0.1, "spgp": 0.5}

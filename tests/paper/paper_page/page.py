@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from paper_job import PaperResult
+from paper_page.parts import listed
 from paper_page.section import Section
 from paper_parts import PARTS, PaperPart
 
-from glovecal_service.report.html import listed, whole_page
+from glovecal_service.report.html import whole_page
 
 REMARK = (
     "The paper's figures are of a real CyberGlove on real hands. Ours are of a <b>simulated</b> glove on a "

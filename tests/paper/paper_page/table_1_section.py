@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
+from paper_page.parts import figure, svg, table
 from paper_page.section import Section
 from table_1 import Table1Row
 
-from glovecal_service.report.drawing import FLOOR, MODEL, QUIET, svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import FLOOR, MODEL, QUIET
 
 HEADS = (
     *("kept still", "affecting", "std., paper", "std., ours", "95 % of ours"),

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from paper_page.beside import number, seconds
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Section
 from table_2 import Table2Row
 
-from glovecal_service.report.drawing import MODEL, QUIET, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import MODEL, QUIET
 
 HEADS = (
     *("mean", "covariance", "training, paper", "ours", "267 frames, paper", "ours"),

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from paper_page.calibrations import CALIBRATION_NAMES, COLOURS
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Demand, Section
 from table_3 import Table3Row
 
-from glovecal_service.report.drawing import MEASURED, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import MEASURED
 
 HEADS = ("pose", "calibration", "paper", "ours", "same wearing", "the wearing alone", "must reach")
 TICKS_DEG = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)

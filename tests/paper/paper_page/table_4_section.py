@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from paper_page.beside import seconds
+from paper_page.parts import figure, figure_svg, table
 from paper_page.section import Section
 from table_4 import Table4Row
 
-from glovecal_service.report.drawing import FLOOR, MODEL, QUIET, figure_svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import FLOOR, MODEL, QUIET
 
 HEADS = (
     *("M", "training, paper", "ours", "one frame, paper", "ours"),

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from multiple_wearings import WearingRow
+from paper_page.parts import figure, svg, table
 from paper_page.section import Section
 
-from glovecal_service.report.drawing import FLOOR, MODEL, svg
-from glovecal_service.report.html import figure, table
+from glovecal_models.presentation.drawing import FLOOR, MODEL
 
 HEADS = ("wearing", "as it is", "after the quick check")
 SENTENCE = (

@@ -17,8 +17,7 @@ from typing import Any
 from told_commands import complaint, with_samples
 
 from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.take import Take
 from glovecal_service.cli.command import main
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from glovecal_service.demo.hidden_session import hidden_session
 from glovecal_service.demo.processes import demo_place, running_service
 from glovecal_service.demo.second_act import DIAGNOSED, Findings
 from glovecal_service.demo.staying import stay
+from glovecal_service.first_run.hidden_session import hidden_session
 
 
 def main(folder: Path) -> None:

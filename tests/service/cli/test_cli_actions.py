@@ -63,7 +63,7 @@ def test_a_straight_line_that_lacks_a_product_is_trained_otherwise(run: Run, tab
     page = table.parent / "diagnosis.html"
     answer = run("diagnose", model, "--report", page)
     assert answer.code == 0, answer.err
-    assert "Missing: nonlinearity on IM_ABD" in answer.out
+    assert "\nnonlinearity on IM_ABD" in answer.out
     assert "The base is a straight line" in answer.out
     assert (
         "IM_ABD: the residual is associated with the angle of I_MCP, which the layout gives it" in answer.out

@@ -18,9 +18,8 @@ from cli_running import Run
 
 from glovecal_client.pictures.source import Picture
 from glovecal_client.pictures.video_file import VideoWriter
-from glovecal_models.colour_glove.camera_file import read_cameras
-from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.palette import PRINTED_SRGB
+from glovecal_models.colour_glove.camera_model import Camera, read_cameras
+from glovecal_models.colour_glove.pattern import PRINTED_SRGB
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
 

@@ -23,15 +23,14 @@ from cli_running import Run, glovecal
 from glovecal_client.pictures.label_file import LabelWriter
 from glovecal_client.pictures.source import Picture
 from glovecal_client.pictures.video_file import VideoWriter
-from glovecal_models.colour_glove.camera_file import write_cameras
-from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
+from glovecal_models.colour_glove.camera_model import Camera, write_cameras
 from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pose.error_learning import other_hand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.errors import Cancelled
-from glovecal_models.takes.camera_reference.estimates import read_estimates
+from glovecal_models.takes.camera_estimates import read_estimates
 from glovecal_service.camera.camera_settings import TrackingSettings
 from glovecal_service.camera.recorded_estimates import Recordings, matched
 from glovecal_service.camera.tracking_setup import ASSUMED, RATE_HZ, RenderedGlove, tracking_setup

@@ -16,11 +16,11 @@ from camera_support import SMALL, ready_folder
 from cli_running import glovecal
 
 from glovecal_client.pictures.label_file import LabelWriter
-from glovecal_models.colour_glove.drawn.hand_motion import hand_motion
 from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pose.error_learning import other_hand
+from glovecal_models.colour_glove.pose.hand_shape_fit import ShapeOnFile, read_shape, write_shape
 from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.shape_file import ShapeOnFile, read_shape, write_shape
 from glovecal_models.colour_glove.skin import RADII_MM, hand_skin, posed
 from glovecal_models.errors import BadInput
 from glovecal_service.camera.tracking_setup import ASSUMED

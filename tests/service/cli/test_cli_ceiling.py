@@ -19,7 +19,7 @@ from glovecal_models.takes.write_table import write_takes
 def test_the_verdict_is_shown_wherever_the_floor_is(tmp_path: Path) -> None:
     run = partial(glovecal, {"GLOVECAL_DATA": str(tmp_path / "data")})
     plan = SessionPlan(
-        seed=2, sensors=("I_PIP",), bits=12, nuisance="white", wearings=2, takes_per_wearing=4, take_s=20.0
+        seed=2, sensors=("I_PIP",), bits=12, nuisance="white", wearings=2, takes_per_wearing=4, take_s=12.0
     )
     write_takes(record_session(plan, (Cause("lag", "one_pole", 2.0),)).takes, tmp_path / "takes.csv")
     run("subject", "add", "pia")

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from cli_running import glovecal
 
 from glovecal_client.rest import RestClient
+from glovecal_models.comparison.answer import Comparison, RotationErrors
+from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.diagnosis.answer import FoundInRecording, MissingEffects, NamedEffect
+from glovecal_models.diagnosis.residual_answer import Unexplained
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.table import read_takes
-from glovecal_service.demo.error_fall import chart, hidden_contract, told_wrongly, verdict
-from glovecal_service.demo.hidden_session import RANDOM_EFFECTS, check_effect, hidden_session
-from glovecal_service.demo.second_act import Findings, prepare, second_act
+from glovecal_service.demo.second_act import (
+    Findings,
+    chart,
+    hidden_contract,
+    prepare,
+    second_act,
+    told_wrongly,
+    verdict,
+)
+from glovecal_service.first_run.hidden_session import RANDOM_EFFECTS, check_effect, hidden_session
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 
@@ -71,6 +83,7 @@ def test_a_hidden_effect_is_compared_placed_named_added_and_revealed(service, tm
     assert any(line.strip().startswith("+ cross_coupling") for line in ending)
 
 
+@pytest.mark.slow
 def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
     found, said, ending, figures = walked(service, tmp_path, "unknown", 3)
     assert list(figures["error_fall_deg"]) == ["raw", "linear", "lmc_gpr"]
@@ -83,54 +96,73 @@ def test_a_cause_without_a_name_is_said_to_be_left(service, tmp_path):
     assert any("an unexplained residual was reported" in sentence for sentence in ending)
 
 
+def compared(rmse_deg: float, floor: NoiseFloor | None) -> Comparison:
+    """One rotation, whose error is that of all."""
+    errors = RotationErrors(100, rmse_deg, rmse_deg, 0.0, 2 * rmse_deg, 0.68, None, 20.0, floor)
+    return Comparison(errors, {"I_PIP": errors}, (), (), (), None)
+
+
+def diagnosed(
+    named: tuple[str, ...] = (),
+    *,
+    is_left: bool = False,
+    problems: Sequence[str] = (),
+    findings: Sequence[FoundInRecording] = (),
+) -> MissingEffects:
+    """``named``: the confidence set, the effect that is named first."""
+    effect = NamedEffect(named[0], (), "correction", named, {}) if named else None
+    left = Unexplained(is_left, "")
+    return MissingEffects({}, effect, (), (), left, None, (), reference_problems=problems, findings=findings)
+
+
 def test_a_wrong_name_is_called_wrong():
     hidden, healthy = (hidden_session(name, 1, take_s=6.0) for name in ("lag", "none"))
-    named = {"effect": "creep", "confidence_set": ["creep", "lag"]}
-    error = {"overall": {"rmse_deg": 2.0, "floor": None}}
-    found = Findings(comparisons={"lmc_gpr": error}, diagnosis={"named": named})
+    found = Findings(comparisons={"lmc_gpr": compared(2.0, None)}, diagnosis=diagnosed(("creep", "lag")))
     assert verdict(hidden, found)[-1].startswith("Partly right: creep was named first; lag is in")
-    named["confidence_set"] = ["creep"]
+    found.diagnosis = diagnosed(("creep",))
     assert verdict(hidden, found)[-1] == "Wrong: creep was named."
     assert hidden_contract(hidden, found)["hidden"]["right"] is False
     assert verdict(healthy, found)[-1] == "Wrong: creep was named."
-    found.diagnosis = {"named": None, "unexplained_residual": {"is_significant": False}}
+    found.diagnosis = diagnosed()
     assert verdict(hidden, found)[-1] == "Wrong: nothing was named."
     assert verdict(healthy, found)[-1] == "Right: nothing was named."
+    unknown = hidden_session("unknown", 1, take_s=6.0)
+    found.diagnosis = diagnosed(is_left=True)
+    assert "an unexplained residual was reported" in verdict(unknown, found)[-1]
+    assert hidden_contract(unknown, found)["hidden"]["right"] is True
+    found.diagnosis = diagnosed()
     assert hidden_contract(healthy, found)["hidden"]["truth"] == "none"
     assert hidden_contract(hidden, found)["noise_floor_deg"] is None
 
 
 def test_what_is_told_beside_the_first_name_and_is_not_so_is_called_wrong():
     hidden, healthy = (hidden_session(name, 1, take_s=6.0) for name in ("lag", "none"))
-    quiet = {"named": None, "findings": [], "reference_problems": []}
-    quiet["unexplained_residual"] = {"is_significant": False}
-    loud = quiet | {"unexplained_residual": {"is_significant": True}}
 
-    def errors(rmse_deg: float) -> dict:
-        overall = {"rmse_deg": rmse_deg, "floor": {"floor_deg": 0.6, "is_lower_bound": False}}
-        return {"overall": overall, "rotations": {"I_PIP": dict(overall)}}
+    def errors(rmse_deg: float) -> Comparison:
+        return compared(rmse_deg, NoiseFloor(0.6, 0.5, 0.7, 0.0, "still hand", 9))
 
-    named = {"effect": "lag", "confidence_set": ["lag"]}
     found = Findings(
         comparisons={"lmc_gpr": errors(3.0), "with_effect": errors(0.8)},
-        diagnosis=quiet | {"named": named}, diagnosis_after=quiet,
-    )  # fmt: skip
+        diagnosis=diagnosed(("lag",)),
+        diagnosis_after=diagnosed(),
+    )
     assert told_wrongly(hidden, found) == []
     problem = "t1 and t2 contradict each other."
-    found.diagnosis["reference_problems"] = [problem]
-    found.diagnosis["findings"] = [{"effect": "sensor_fault"}]
-    found.diagnosis_after = loud | {"named": {"effect": "creep"}}
+    fault = FoundInRecording("sensor_fault", "stuck", ("A",), "It stands still.")
+    found.diagnosis = diagnosed(("lag",), problems=[problem], findings=[fault])
+    found.diagnosis_after = diagnosed(("creep",), is_left=True)
     wrong = told_wrongly(hidden, found)
     assert wrong[:3] == [f"{problem!r} was told", "sensor_fault was found", "creep was named afterwards"]
     assert "of an error as in healthy gloves" in wrong[3]
     assert verdict(hidden, found)[-4:] == [f"Wrong: {said}." for said in wrong]
-    found.comparisons["with_effect"]["rotations"]["I_PIP"]["rmse_deg"] = 1.0
+    overall, one = found.comparisons["with_effect"], errors(1.0).rotations
+    found.comparisons["with_effect"] = replace(overall, rotations=one)
     assert len(told_wrongly(hidden, found)) == 3, "of one rotation something is left"
     found.comparisons["with_effect"] = errors(1.5)
     assert len(told_wrongly(hidden, found)) == 3, "an error of 2.5 noise floors: something is left"
     found.comparisons["with_effect"] = errors(0.5)
     assert "lies below its noise floor" in told_wrongly(hidden, found)[-1]
-    clean = Findings(comparisons={"lmc_gpr": errors(0.7)}, diagnosis=loud)
+    clean = Findings(comparisons={"lmc_gpr": errors(0.7)}, diagnosis=diagnosed(is_left=True))
     assert told_wrongly(healthy, clean) == ["an unexplained residual was reported of a healthy glove"]
 
 

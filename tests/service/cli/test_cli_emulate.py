@@ -19,6 +19,8 @@ from realtime_support import eventually
 from glovecal_client import Recording, open_router
 from glovecal_client.capture.command import main as capture_alone
 from glovecal_client.capture.command import parse_options, run_capture
+from glovecal_client.capture.daemon import CaptureSettings
+from glovecal_client.keys import GloveKeys
 from glovecal_service.emulators.catalogue import PROTOCOLS
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3, card_file
 
@@ -81,9 +83,8 @@ def test_capture_records_an_emulated_glove_as_simulated(tmp_path: Path) -> None:
         endpoint, stop = free_endpoint(), threading.Event()
         with open_router([endpoint]):
             threading.Thread(target=stop_after, args=(60, tmp_path, stop)).start()
-            summary = run_capture(
-                device, "right", options=options, endpoints=[endpoint], data=tmp_path, stop=stop
-            )
+            settings = CaptureSettings(GloveKeys("lab", "right"), endpoints=(endpoint,), data=tmp_path)
+            summary = run_capture(device, settings, options, stop=stop)
     finally:
         process.terminate()
         process.communicate(timeout=20)

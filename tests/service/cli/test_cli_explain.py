@@ -47,7 +47,7 @@ def test_a_table_for_people(explained: tuple[Run, str]) -> None:
     answer = run("explain", model, "--take", "pinch", "--at", "1.5", "--rotation", "I_MCP")
     assert answer.code == 0, answer.err
     lines = answer.out.splitlines()
-    assert lines[0] == f"Model {model[:12]} (linear), take pinch of monday: frame 150 at 1.500 s."
+    assert lines[0] == f"Model {model[:12]} (linear), take pinch of monday, frame 150 at 1.500 s:"
     assert lines[1].startswith("Transient: hysteresis, creep began anew 1.5 s ago and settles after 2.5 s")
     assert [line.split()[0] for line in lines if line.startswith(("base", "hyst", "creep", "angle"))] == [
         "base", "hysteresis", "creep", "angle",
@@ -78,4 +78,4 @@ def test_what_is_refused(explained: tuple[Run, str]) -> None:
     nobody = run("explain", model, "-t", "pinch", "--at", "1", "-r", "W_FLEX")
     assert nobody.code == 1
     assert "no rotation 'W_FLEX' in this model; there are I_MCP, I_PIP, M_MCP" in nobody.said
-    assert "there is no take 'fist'" in run("explain", model, "-t", "fist", "--at", "1").said
+    assert "no take 'fist'" in run("explain", model, "-t", "fist", "--at", "1").said

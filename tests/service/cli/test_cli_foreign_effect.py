@@ -20,15 +20,19 @@ ADVICE = "Loosen and tighten the strap while the room stays as warm as it is."
 PACKAGE = f'''
 """Strap tension: a tight strap stretches the cloth over the knuckles."""
 
-from glovecal import ContextEffect, Motion, Rival
+from glovecal import About, ContextEffect, Motion, Relations, Rival
+
+STRAP = Motion("strap", {ADVICE!r}, 45)
 
 
 class StrapTension(ContextEffect):
     name = "strap_tension"
-    explanation = "A tight strap stretches the cloth over the knuckles."
-    source = "measured with a spring scale"
+    about = About(
+        "A tight strap stretches the cloth over the knuckles.",
+        source="measured with a spring scale",
+        relations=Relations(rivals=(Rival("strap_tension", "temperature", STRAP),)),
+    )
     context = ("strap_n",)
-    rivals = (Rival("temperature", Motion("strap", {ADVICE!r}, 45)),)
 '''
 SENSORS = ("I_MCP", "I_PIP")
 CALIBRATION = ("--method", "linear", "--folds", 0)

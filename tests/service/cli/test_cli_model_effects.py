@@ -10,6 +10,7 @@ from cli_running import glovecal
 from effect_models import CREEP, HYSTERESIS, UNITS, added, model_with
 
 from glovecal_models.calibration.artifact import dump
+from glovecal_models.calibration.text import model_effect
 from glovecal_service.cli.model.models import effect_rows
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -41,5 +42,4 @@ def test_a_models_effects_are_shown_with_units_and_evidence(tmp_path: Path) -> N
 def test_many_numbers_are_counted() -> None:
     wearings = [f"w{number}" for number in range(10)]
     shift = added("donning_shift", (), range(1, 21), ("I_PIP",), settings={"wearings": wearings, **UNITS})
-    details = {"effect": shift.name, "rotations": ["I_PIP"], "evidence": {}, "parameters": shift.described()}
-    assert effect_rows([details])[0]["numbers"].endswith("and 12 more")
+    assert effect_rows([model_effect(shift)])[0]["numbers"].endswith("and 12 more")

@@ -37,9 +37,10 @@ def test_training_says_what_it_did(walked):
     models = by_method(run)
     assert set(models) == {"linear", "raw"}
     id = models["linear"]["id"]
-    assert linear.out.startswith(f"Model {id[:12]} (linear) for anna, held-out error ")
-    assert linear.out.splitlines()[0].endswith("Active.")
-    assert linear.out.splitlines()[1].startswith("In a wearing not seen: unknown")
+    lines = linear.out.splitlines()
+    assert lines[1].startswith(f"Model {id[:12]} (linear) for anna, held-out error ")
+    assert lines[1].endswith("Active.")
+    assert lines[2].startswith("In a wearing not seen: unknown")
     assert "2 takes" in linear.err
     assert "PALM_ARCH" in linear.err
     assert raw["model"]["id"] == models["raw"]["id"] == raw["result"]["model"]
@@ -62,7 +63,7 @@ def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
     assert beside.out.splitlines()[0] == "Against second:"
     everywhere = next(line.split() for line in beside.out.splitlines() if line.startswith("all"))
     assert everywhere[1:3] == [f"{raw:.2f}", f"{linear:.2f}"]
-    assert "Careful" not in beside.err
+    assert "Careful" not in beside.said
     floors = [results[id]["overall"]["floor"] for id in ids]
     floor = min(floors, key=lambda one: (one["is_lower_bound"], one["floor_deg"]))
     interval = f"{floor['low_deg']:.2f}-{floor['high_deg']:.2f}"
@@ -75,18 +76,19 @@ def test_models_are_compared_side_by_side_on_takes_they_have_not_seen(walked):
     assert in_mm[1].split()[:3] == ["all", f"{tips[0]:.2f}", f"{tips[1]:.2f}"]
     one = run("compare", ids[1], "--poses", "--take", "second")
     assert "\nthumb to index" in one.out
-    assert results[ids[1]]["fingertips"]["sentence"] in one.err
-    assert "glovecal subject measure anna --hand-length-mm LENGTH" in one.err
+    assert results[ids[1]]["fingertips"]["sentence"] in one.out
+    assert "glovecal subject measure anna --hand-length-mm LENGTH" in one.out
     assert "fist" in one.out
     heads = next(line.split() for line in one.out.splitlines() if line.startswith("rotation"))
     assert heads[:4] == ["rotation", "RMSE", "floor", "mean"]
     assert "NLPD" in one.out
     assert (
-        max(len(line) for line in one.out.splitlines() if not line.endswith((".", ")"))) <= 80
+        max(len(line) for line in one.out.splitlines() if not line.endswith((".", ")", ":"))) <= 80
     )  # the tables
     seen = run("compare", ids[1], "-t", "poses", "-t", "second", "-t", "poses")
-    assert seen.out.startswith("Against poses, second:\n")
-    assert f"Careful: model {ids[1][:12]} was trained on take poses" in seen.err
+    assert "\nTakes: poses, second\n" in seen.out
+    careful = f"Careful, not a held-out error: linear {ids[1][:6]} was trained on 1 of these takes (poses)."
+    assert careful in seen.out
 
 
 def test_a_page_with_both_models_is_written_beside_the_json(walked, tmp_path):
@@ -187,7 +189,7 @@ def test_nothing_is_left_to_compare_with(run, tables):
     run("subject", "add", "ben")
     assert run("take", "import", tables / "other.parquet", "-s", "ben").code == 0
     trained = run("train", "-s", "ben", "--method", "raw", "--folds", 0, "--no-activate")
-    assert trained.out.splitlines()[0].endswith("no cross-validation. Not active.")
+    assert "no cross-validation. Not active." in trained.out
     (model,) = run("model", "list", "--json").json
     refused = run("compare", model["id"])
     assert refused.code == 1

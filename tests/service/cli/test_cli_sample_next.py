@@ -13,10 +13,12 @@ from realtime_support import LAYOUT, linear_model
 
 from glovecal_client.rest import Refused
 from glovecal_models.calibration.artifact import dump
+from glovecal_models.diagnosis.answer import MissingEffects
+from glovecal_models.diagnosis.residual_answer import NextTake
 from glovecal_models.simulation.protocol import free_segment, segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.write_table import write_takes
+from glovecal_service.plain import document_of
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -67,12 +69,13 @@ def test_the_steps_are_ranked_with_what_is_expected_of_them(folder: Path) -> Non
 
 def test_what_a_diagnosis_asks_for_stands_beside_it(folder: Path) -> None:
     model = run(folder, "-s", "anna", "--json").json["model"]
-    wanted = {"what": "Swing fast.", "seconds": 25, "separates": ["lag", "clock_offset"]}
+    wanted = NextTake("fast", "Swing fast.", 25, ("lag", "clock_offset"), "fast")
+    found = MissingEffects({}, None, (), (), None, wanted, (), model=model)
     with Store.open(Settings(data=folder / "data")) as store:
         store.jobs.create("diagnose", {"model": model}, subject="anna")
         job = store.jobs.claim("test")
         assert job is not None
-        store.jobs.finish(job.id, job.attempt, {"model": model, "next_take": wanted})
+        store.jobs.finish(job.id, job.attempt, document_of(found))
     assert run(folder, model[:8], "--json").json["diagnosed"]["separates"] == ["lag", "clock_offset"]
     assert "Also useful, 25 s: Swing fast. The diagnosis cannot tell" in run(folder, "-s", "anna").out
 

@@ -8,8 +8,7 @@ import numpy as np
 from cli_running import Run
 
 from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.session_drift import SHAPES
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes

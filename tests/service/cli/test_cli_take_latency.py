@@ -23,8 +23,7 @@ from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.capture.device import Reading
 from glovecal_client.errors import NoAnswer
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask_json
-from glovecal_client.session import open_client
+from glovecal_client.session import ask_json, open_client
 from glovecal_client.wire.frame import Frame, decode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.takes.take import Take
@@ -35,7 +34,7 @@ from glovecal_service.settings import Settings
 GLOVE, LATENCY_S, RATE_HZ = "tapper", 0.06, 120.0
 USUAL_KEY_S = 0.0125
 """Added for a key of unknown latency."""
-TAPS, EVERY_S, FIRST_S = 25, (0.4, 0.5), 0.6
+TAPS, EVERY_S, FIRST_S = 34, (0.4, 0.5), 0.6
 STRIKE_S, REST_S, LIFT_S, WIDE = 0.05, 0.06, 0.2, 60.0
 
 

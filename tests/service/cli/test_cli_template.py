@@ -8,8 +8,7 @@ import pytest
 from cli_running import Run
 
 from glovecal_models.simulation.protocol import segments
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
 from glovecal_models.takes.write_table import write_takes
 
 GLOVE = SimulatedGlove(3)
@@ -19,7 +18,7 @@ GLOVE = SimulatedGlove(3)
 def tina(run: Run, tmp_path: Path) -> Run:
     """The command on a folder with four takes of one simulated glove."""
     motions = ("key_poses", "evaluation", "thumb", "free")
-    takes = [simulate_take(GLOVE, segments(each, 3), rate_hz=15, name=each).take for each in motions]
+    takes = [simulate_take(GLOVE, segments(each, 3), rate_hz=10, name=each).take for each in motions]
     write_takes(takes, tmp_path / "takes.csv")
     assert run("take", "import", tmp_path / "takes.csv", "-s", "tina", "--layout", "cyberglove18").code == 0
     return run

@@ -7,14 +7,14 @@ from pathlib import Path
 from cli_running import Run
 
 from glovecal_models.layout import Layout
-from glovecal_service.vendor_calibrations import asr
+from glovecal_service.vendor_calibrations import cyberglove
 from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
 
 SENSORS = Layout.built_in("cyberglove22").sensors
 
 
 def test_the_command_imports_and_exports(run: Run, tmp_path: Path) -> None:
-    text = asr.write(dict.fromkeys(SENSORS, SensorLine(0.8, 60.0)), Counts(1.0, 255.0), "right")
+    text = cyberglove.write_asr(dict.fromkeys(SENSORS, SensorLine(0.8, 60.0)), Counts(1.0, 255.0), "right")
     (tmp_path / "right.cal").write_text(text)
     chosen = ("--format", "asr", "--layout", "cyberglove22", "-s", "anna", "--create-subject")
     imported = run("model", "import", tmp_path / "right.cal", *chosen)

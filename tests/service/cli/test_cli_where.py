@@ -28,25 +28,25 @@ def test_sentences_for_people_with_the_worst_rotation_first(trained: tuple[Run, 
     answer = run("where", model[:8])
     assert answer.code == 0, answer.err
     first, *_ = answer.out.splitlines()
-    assert first == f"Model {model[:8]} (linear) against second:"
+    assert first.startswith("Where the model fails on 1 take of anna, version 1 of ")
+    assert f" (linear, {model[:12]}; simulated glove):" in first
+    assert "\nTakes: second\n" in answer.out
     assert "W_FLEX: RMSE" in answer.out
     assert answer.out.index("RMSE 1") < answer.out.index("RMSE 2.")
     assert "noise floor" in answer.out
     assert "The worst seconds:" in answer.out
     assert "Noise floors:" not in answer.out
     floors = run("where", model[:8], "--floors").out
-    assert "repeated poses" in floors
+    assert "still joint" in floors
     assert "frame to frame" in floors
 
 
 def test_json_for_programs_and_a_page_for_everybody(trained: tuple[Run, str], tmp_path: Path) -> None:
     run, model = trained
     page = tmp_path / "second.html"
-    found = run("where", model, "--take", "second", "--json").json
+    found = run("where", model, "--take", "second", "--json", "--report", page).json
     assert {item["rotation"] for item in found["rotations"]} >= {"W_FLEX", "IM_ABD", "I_PIP"}
     assert all(item["floor"]["floor_deg"] > 0 for item in found["rotations"])
-    written = run("where", model, "--take", "second", "--report", page)
-    assert f"Wrote {page}" in written.out
     assert page.read_text().startswith("<!doctype html>")
     assert "simulated" in page.read_text()
     again = run("where", model, "--report", page)
@@ -58,7 +58,7 @@ def test_a_take_the_model_has_seen_is_told(trained: tuple[Run, str]) -> None:
     run, model = trained
     answer = run("where", model, "--take", "poses")
     assert answer.code == 0, answer.err
-    assert "was trained on take poses" in answer.said
+    assert "was trained on 1 of these takes (poses)" in answer.out
 
 
 def test_clocks_are_found_repaired_and_put_back(run: Run, tmp_path: Path) -> None:

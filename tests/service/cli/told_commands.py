@@ -6,6 +6,7 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -62,8 +63,13 @@ def told(text: str) -> Iterator[tuple[str, bool]]:
         yield re.sub(r" \.\.\.$", "", line).rstrip(" .?"), is_advice
 
 
-def sentences() -> Iterator[tuple[str, str]]:
+@cache
+def sentences() -> list[tuple[str, str]]:
     """Where each text of the product stands, and the text, with a sample for each value put into it."""
+    return list(_sentences())
+
+
+def _sentences() -> Iterator[tuple[str, str]]:
     for package in PRODUCT:
         for path in sorted((ROOT / package).rglob("*.py")):
             tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -9,13 +9,11 @@ import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import Handedness
-from glovecal_models.hand.rotations import HAND_ROTATIONS
+from glovecal_models.hand.rotations import HAND_ROTATIONS, Handedness
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.body_markers import BodyMarkers, hand_frame, read_trc
 from glovecal_service.exports.hand_motion import HandMotion
-from glovecal_service.exports.markers import markers
-from glovecal_service.exports.trc import trc_text
+from glovecal_service.exports.marker_tables import markers, trc_text
 
 TIME_S = np.arange(60) / 60
 ARM = {"RAD": (0.0, 30.0, 0.0), "ULN": (0.0, -30.0, 0.0), "ELB": (-250.0, 0.0, 0.0)}

@@ -14,8 +14,8 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import ARCHING_ROTATIONS, FINGERS, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import Palm, hand_skeleton
-from glovecal_service.exports.body_at_rest import PALM_DOWN, SIDES
 from glovecal_service.exports.body_markers import HandFrame
+from glovecal_service.exports.bvh import PALM_DOWN, SIDES
 from glovecal_service.exports.formats import FORMATS
 from glovecal_service.exports.hand_motion import HandMotion
 

@@ -19,8 +19,7 @@ from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.layout import Layout
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import CONTENTS, HandMotion, on_one_time
-from glovecal_service.exports.markers import markers
-from glovecal_service.exports.trc import trc_text
+from glovecal_service.exports.marker_tables import markers, trc_text
 
 SENSORS = Layout.built_in("cyberglove22").sensors
 RIGHT, LEFT = hand_skeleton(hand="right"), hand_skeleton(hand="left")

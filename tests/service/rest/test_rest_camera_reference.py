@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from simulated_camera import CALIBRATED
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
-from glovecal_models.simulation.simulated_camera import CALIBRATED
-from glovecal_models.takes.camera_reference.estimates import write_estimates
+from glovecal_models.takes.camera_estimates import write_estimates
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.write_table import write_takes
 from glovecal_service.cli.take.takes import camera

@@ -20,11 +20,11 @@ from realtime_support import eventually, free_endpoint
 from glovecal_client.keys import GloveKeys
 from glovecal_client.rest import Refused, RestClient
 from glovecal_client.session import open_router
-from glovecal_models.colour_glove.camera_file import write_cameras
+from glovecal_models.colour_glove.camera_model import write_cameras
 from glovecal_service.camera.tracking_setup import ASSUMED
+from glovecal_service.rest.glove.cameras import said_of_itself
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
-from glovecal_service.views.cameras import said_of_itself
 
 
 @pytest.fixture(scope="module")

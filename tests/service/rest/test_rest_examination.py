@@ -12,7 +12,7 @@ from glovecal_client.rest import RestClient
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.simulated_glove import SimulatedGlove
 from glovecal_models.takes.write_table import write_takes
-from glovecal_service.realtime.model_choice import choose
+from glovecal_service.realtime.model_watcher import choose
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 

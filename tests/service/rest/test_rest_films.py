@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from glovecal_client.capture.computer import computer_id
+from glovecal_client.clock import computer_id
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take

@@ -10,8 +10,7 @@ import pytest
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.hand.skeleton_document import skeleton_document
+from glovecal_models.hand.skeleton import hand_skeleton, skeleton_document
 
 
 def test_the_skeleton_is_that_of_the_subject(client: RestClient) -> None:

@@ -22,7 +22,7 @@ from glovecal_service.exports.body_markers import read_trc
 from glovecal_service.exports.formats import FORMATS
 from glovecal_service.exports.hand_motion import HandMotion
 from glovecal_service.vendor_calibrations.calibration_format import Counts
-from glovecal_service.vendor_calibrations.shadow_xml import read as read_xml
+from glovecal_service.vendor_calibrations.shadow import read_xml
 
 MANY = 100_000
 SOON_S = 20.0

@@ -286,6 +286,25 @@ def test_events_and_cancel_over_real_http(serve: Callable[..., str], settings: S
             assert bad.status_code == 422
 
 
+def test_an_answer_that_cannot_be_read_any_more_is_shown_as_stored_and_has_no_page(
+    serve: Callable[..., str], settings: Settings
+) -> None:
+    with Store.open(settings) as store:
+        ids = []
+        for kind in ("ceiling", "diagnose"):
+            job = store.jobs.create(kind, {})
+            claimed = store.jobs.claim("a runner")
+            assert claimed is not None
+            store.jobs.finish(job.id, claimed.attempt, {"verdict": ["of old"]})
+            ids.append(job.id)
+        with httpx.Client(base_url=f"{serve(settings)}/v1", trust_env=False, timeout=120) as http:
+            for id in ids:
+                assert http.get(f"/jobs/{id}").json()["result"] == {"verdict": ["of old"]}
+                page = http.get(f"/jobs/{id}/report")
+                assert page.status_code == 409
+                assert "ask again" in page.json()["detail"]
+
+
 def test_events_of_a_training_job_arrive_while_it_runs(
     serve: Callable[..., str], settings: Settings, write_table: Write
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 import trc
 
 from glovecal_client.rest import Refused, RestClient
-from glovecal_service.exports.trc import trc_text
+from glovecal_service.exports.marker_tables import trc_text
 
 Write = Callable[..., Path]
 

@@ -24,8 +24,7 @@ from anyio.from_thread import start_blocking_portal
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_service.rest.app import create_app
-from glovecal_service.rest.http.body_guard import BodyGuard
-from glovecal_service.rest.http.request_guard import is_loopback
+from glovecal_service.rest.http.request_guard import BodyGuard, is_loopback
 from glovecal_service.rest.in_process import PortalTransport
 from glovecal_service.settings import Settings
 from glovecal_service.store.errors import StoreDamaged

@@ -9,7 +9,7 @@ import trc
 from stored_takes import LAYOUT, make_take
 
 from glovecal_client.rest import Refused, RestClient
-from glovecal_service.realtime.model_choice import choose
+from glovecal_service.realtime.model_watcher import choose
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 

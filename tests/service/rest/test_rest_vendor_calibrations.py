@@ -6,11 +6,11 @@ import pytest
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.layout import Layout
-from glovecal_service.vendor_calibrations import asr
+from glovecal_service.vendor_calibrations import cyberglove
 from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
 
 SENSORS = Layout.built_in("cyberglove22").sensors
-TEXT = asr.write(dict.fromkeys(SENSORS, SensorLine(0.8, 60.0)), Counts(1.0, 255.0), "right")
+TEXT = cyberglove.write_asr(dict.fromkeys(SENSORS, SensorLine(0.8, 60.0)), Counts(1.0, 255.0), "right")
 BODY = {"format": "asr", "text": TEXT, "layout": "cyberglove22", "subject": "anna"}
 
 

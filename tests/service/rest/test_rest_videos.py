@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_client.capture.computer import computer_id
-from glovecal_client.pictures.preview import write_preview
+from glovecal_client.clock import computer_id
 from glovecal_client.pictures.recording import VideoRecording
-from glovecal_client.pictures.rendered import RenderedPictures
+from glovecal_client.pictures.source import RenderedPictures
+from glovecal_client.pictures.video_file import write_preview
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take

@@ -56,6 +56,13 @@ def address(settings: Settings, model: str) -> Iterator[str]:
 
 
 @pytest.fixture(scope="package")
+def trained(address: str) -> str:
+    """The id of a model whose takes are stored."""
+    found = httpx.get(f"{address}/v1/models").json()
+    return next(each["id"] for each in found if each["facts"].get("takes"))
+
+
+@pytest.fixture(scope="package")
 def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
     if shutil.which("chromium") is None:
         not_here("Chromium is not installed (Debian: apt-get install chromium)")
@@ -78,9 +85,9 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
     contexts = []
 
     def open_page(name: str, at: str = address) -> Opened:
-        # Half as many pixels each way: the processor draws them all.
+        # A quarter of the pixels each way: the processor draws them all.
         context = browser.new_context(
-            viewport={"width": 1280, "height": 800}, device_scale_factor=0.5, color_scheme="light"
+            viewport={"width": 1280, "height": 800}, device_scale_factor=0.25, color_scheme="light"
         )
         context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)

@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import zenoh
@@ -17,11 +19,13 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from realtime_support import WireGlove
 
+from glovecal_client.capture.cyberglove import find_port
 from glovecal_client.rest import RestClient
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_service.demo.hidden_session import HiddenSession
-from glovecal_service.jobs.child_record import artifact_array, keep_child
+from glovecal_service.first_run.hidden_session import HiddenSession
+from glovecal_service.questions.making import keep
+from glovecal_service.serve import web
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -31,8 +35,15 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )  # fmt: skip
 
+COLOURS = "color-contrast"
+"""All that another colour scheme changes."""
+
+MOST_LOOKS = 10
 PATIENCE_MS = 120_000
 """For whatever a page is to show: on a busy computer service, browser and drawing wait in turn."""
+
+SEED = 1
+"""Of what ``web_that_draws`` hides."""
 
 STREAMING = {"state": "streaming", "sentence": "", "rate_hz": 60.0}
 
@@ -50,6 +61,12 @@ def running_browser(*flags: str) -> Iterator[Browser]:
         browser.close()
 
 
+def web_that_draws(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:
+    """The web process, with what it hides known to the test. This computer's ports are nobody's business."""
+    with patch("secrets.randbelow", return_value=SEED), patch.object(find_port, "_listed_ports", dict):
+        web(settings, stopped, started)
+
+
 @dataclass
 class Opened:
     """A page of the studio, and what went wrong on it."""
@@ -64,14 +81,52 @@ class Opened:
 Open = Callable[..., Opened]
 
 
-def serious(page: Page) -> list[str]:
-    """What axe-core finds that keeps somebody from using the page: findings of serious or critical impact."""
-    found = Axe().run(page).response["violations"]
+def serious(page: Page, *rules: str) -> list[str]:
+    """What axe-core finds that keeps somebody from using the page, or makes it harder: findings of moderate,
+    serious or critical impact.
+
+    Of ``rules`` alone where they are given. Colours that fade, under the mouse or after a click, are waited
+    for.
+    """
+    page.mouse.move(0, 0)
+    findings, looks = _findings(page, *rules), 1
+    while looks < MOST_LOOKS and any(item.startswith(COLOURS) for item in findings):
+        page.wait_for_timeout(300)
+        findings, looks = _findings(page, *rules), looks + 1
+    return findings
+
+
+def _findings(page: Page, *rules: str) -> list[str]:
+    only = {"runOnly": {"type": "rule", "values": [*rules]}} if rules else {}
+    found = Axe().run(page, options={"resultTypes": ["violations"], **only}).response["violations"]
     return [
-        f"{item['id']}: {item['nodes'][0]['html'][:200]}"
+        f"{item['id']} ({item['impact']}): {item['nodes'][0]['html'][:200]}"
         for item in found
-        if item["impact"] in ("serious", "critical")
+        if item["impact"] != "minor"
     ]
+
+
+WITHOUT_FOCUS = """() => {
+  const look = each => [each, each.closest(".q-field__control")].filter(Boolean)
+    .map(one => { const style = getComputedStyle(one); return style.outline + style.boxShadow; }).join();
+  const focusable = "a[href], button, input, select, textarea, summary, audio[controls], [tabindex]";
+  return [...document.querySelectorAll(focusable)]
+    .filter(each => each.tabIndex >= 0 && !each.disabled)
+    .filter(each => each.checkVisibility({ visibilityProperty: true }))
+    .filter(each => {
+      document.activeElement.blur();
+      const before = look(each);
+      each.focus({ preventScroll: true, focusVisible: true });
+      return document.activeElement === each && look(each) === before;
+    })
+    .map(each => each.outerHTML.slice(0, 200));
+}"""
+
+
+def without_focus(page: Page) -> list[str]:
+    """What does not show that the keyboard is on it."""
+    page.keyboard.press("Tab")  # whoever uses a mouse is not shown where the keyboard would be
+    return page.evaluate(WITHOUT_FOCUS)
 
 
 def with_calibration(
@@ -96,9 +151,7 @@ def with_calibration(
             chosen = TrainingSettings(method=method, samples=300, folds=2)
             hashes = [record.artifact for record in records]
             model = train(takes, layout, subject, chosen, take_hashes=hashes)
-            made = keep_child(
-                store, artifact_array(model), learned["layout"], records, chosen, {}, activate=True
-            ).id
+            made = keep(store, model, learned["layout"], records, chosen, {}, activate=True).id
     return learned["layout"], made
 
 
@@ -113,7 +166,8 @@ def moving(
 ) -> Iterator[WireGlove]:
     """A glove that bends and stretches, 60 frames a second, and says once a second that it streams.
 
-    ``acts`` changes what it does: ``dropped`` a sensor that reads zero, ``silent`` no frames.
+    ``acts`` changes what it does: ``dropped`` a sensor that reads zero, ``silent`` no frames, ``still`` a
+    hand that does not move, ``one`` only its first sensor that does.
     """
     glove = WireGlove(session, settings, name, subject=subject)
     stopped, acts = threading.Event(), acts if acts is not None else set()
@@ -126,7 +180,9 @@ def moving(
                 session.put(glove.keys.status, json.dumps(STREAMING))
             bend = 140.0 + 60.0 * np.sin(at / 20.0)
             if "silent" not in acts:
-                glove.send((0.0 if "dropped" in acts else bend, bend, bend))
+                others = 140.0 if acts & {"still", "one"} else bend
+                first = 140.0 if "still" in acts else bend
+                glove.send((0.0 if "dropped" in acts else first, others, others))
             at += 1
 
     thread = threading.Thread(target=send)

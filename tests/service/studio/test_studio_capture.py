@@ -211,7 +211,7 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
     page.get_by_role("heading", name=f"{name}: done").wait_for()
     expect(page.get_by_text("in the service's folder films")).to_be_visible()
     assert serious(page) == []
-    page.locator("input[type=file]").set_input_files(reference)
+    page.get_by_role("region", name="Reference").locator("input[type=file]").set_input_files(reference)
     told = page.get_by_role("region", name="Reference").get_by_role("status")
     expect(told).to_contain_text("measured rotations")
     take = next(each for each in asked(address, "takes", subject=SUBJECT) if each["name"] == name)

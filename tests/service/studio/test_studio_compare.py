@@ -64,13 +64,17 @@ def cursor(page: Page, name: str) -> Locator:
     return page.get_by_role("slider", name=f"Cursor {name}")
 
 
-def test_opened_without_a_choice_it_shows_the_newest_model_and_its_worst_rotation(
+def test_opened_without_a_choice_it_shows_the_active_model_and_its_worst_rotation(
     opened: Open, client: RestClient
 ) -> None:
-    seen = filled(opened, "compare")
-    page = seen.page
     subjects = {(take["subject"], take["layout"]) for take in client.get("/takes")}
-    newest = [one for one in client.get("/models") if (one["subject"], one["layout"]) in subjects][-1]
+    models = [one for one in client.get("/models") if (one["subject"], one["layout"]) in subjects]
+    who = models[-1]["subject"]
+    own = [one for one in client.get("/models") if one["subject"] == who]
+    chosen = next((one for one in reversed(own) if one["active"]), own[-1])
+    newest = chosen if chosen in models else [one for one in models if one["subject"] == who][-1]
+    seen = filled(opened, f"compare?who={who}")
+    page = seen.page
     link = asked(page)
     assert newest["id"].startswith(link["models"])
     answer = client.post(f"/models/{newest['id']}/compare", {"takes": link["takes"].split(",")})

@@ -31,7 +31,7 @@ def test_the_picture_of_the_named_effect_has_the_points_of_rest(
 ) -> None:
     page = opened(f"diagnose?model={diagnosis['model']}").page
     named = diagnosis["named"]
-    expect(page.locator(".finding-facts")).to_contain_text("Confidence set")
+    expect(page.locator(".finding-facts")).to_contain_text("No other effect explains")
     expect(page.locator(".candidate-table tbody tr")).not_to_have_count(0)
     for item in diagnosis["not_identifiable"]:
         expect(page.locator(".reasons", has_text=item["why"]).first).to_be_visible()

@@ -23,8 +23,8 @@ from studio_support import Open, with_calibration
 
 from glovecal_client.rest import RestClient
 from glovecal_models.takes.write_table import write_takes
-from glovecal_service.demo.hidden_session import HiddenSession
 from glovecal_service.demo.processes import DemoPlace, running_capture
+from glovecal_service.first_run.hidden_session import HiddenSession
 from glovecal_service.settings import Settings
 
 pytestmark = pytest.mark.needs_chromium
@@ -127,6 +127,7 @@ def test_the_missing_effect_is_seen_named_added_and_live(
     expect(main.get_by_role("progressbar")).to_be_hidden()
     picture("2-diagnose")
 
+    person.choose(main.get_by_role("checkbox", name="Live poses come from it"))
     person.choose(add)
     fall = main.get_by_role("link", name="See the error fall")
     fall.wait_for()

@@ -16,6 +16,7 @@ from glovecal_client.errors import NoAnswer, QueryRefused
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag
+from glovecal_service.rest.job.answer import Job
 from glovecal_service.settings import Settings
 from glovecal_service.studio.glove_state import SENTENCES, Word, glove_state
 from glovecal_service.studio.live_feed import LiveFeeds
@@ -123,5 +124,5 @@ def test_a_glove_that_does_not_answer_holds_up_nobody() -> None:
     ],
 )
 def test_a_finished_job_leads_to_its_result(kind: str, result: Any, address: str | None) -> None:
-    link = result_link({"id": "j1", "kind": kind, "result": result})
+    link = result_link(Job.model_construct(id="j1", kind=kind, result=result))
     assert (link and link[1]) == address

@@ -43,7 +43,7 @@ def test_a_model_is_taken_apart_by_keyboard(opened: Open, address: str, remember
     found = httpx.get(f"{address}/v1/models/{remembering}").json()
     seen = opened("models")
     version = seen.page.locator(f'[data-model="{remembering}"]')
-    version.get_by_role("button", name="Take apart").press("Enter")
+    version.get_by_role("button", name="Look inside").press("Enter")
     expect(version.get_by_role("heading", name="Effect 1: creep")).to_be_visible()
     [effect] = found["effect_details"]
     learned = version.get_by_role("region", name="What creep learned").locator("tbody tr")
@@ -52,9 +52,20 @@ def test_a_model_is_taken_apart_by_keyboard(opened: Open, address: str, remember
     assert learned.first.locator("td").first.inner_text() == f"{next(iter(numbers.values())):.4g}"
     rotations = version.get_by_role("region", name="Rotations of the model").locator("tbody th")
     expect(rotations).to_have_text([one["rotation"] for one in found["rotations"]])
-    seen.page.wait_for_timeout(300)
     assert serious(seen.page) == []
     assert version.get_by_role("button", name="Take creep out").is_enabled()
+    assert seen.complaints == []
+
+
+def test_a_report_is_one_click_and_opens_as_a_page_and_as_pdf(opened: Open, trained: str) -> None:
+    seen = opened("models")
+    version = seen.page.locator(f'[data-model="{trained}"]')
+    version.get_by_role("button", name="Report", exact=True).press("Enter")
+    links = [seen.page.get_by_role("link", name=name) for name in ("Open the report", "As PDF")]
+    expect(links[0]).to_be_visible()
+    page, pdf = (httpx.get(link.evaluate("each => each.href")) for link in links)
+    assert "<h1>Calibration of anna" in page.text
+    assert (pdf.headers["content-type"], pdf.content[:5]) == ("application/pdf", b"%PDF-")
     assert seen.complaints == []
 
 
@@ -87,7 +98,7 @@ def test_takes_have_their_quality_and_gloves_their_layouts(
 ) -> None:
     with Store.open(settings) as store:
         store.gloves.seen("seen-once", {"layout": LAYOUT.name, "simulated": True})
-    page = opened("models").page
+    page = opened("takes").page
     takes = httpx.get(f"{address}/v1/takes").json()
     rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
     expect(rows).to_have_count(len(takes))
@@ -97,6 +108,7 @@ def test_takes_have_their_quality_and_gloves_their_layouts(
         expect(row.locator(".take-quality")).to_contain_text(f"{check['rate_hz']:.1f} Hz")
         for sentence in check["sentences"][:2]:
             expect(row).to_contain_text(sentence)
+    page = opened("models").page
     layouts = page.get_by_role("region", name="Layouts").last.locator("tbody th")
     gloves = httpx.get(f"{address}/v1/gloves").json()
     expect(layouts).to_have_text([each["name"] for each in gloves["layouts"]])

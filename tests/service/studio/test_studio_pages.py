@@ -5,13 +5,15 @@ from __future__ import annotations
 import httpx
 import pytest
 from playwright.sync_api import expect
-from studio_support import Open, serious
+from studio_support import COLOURS, Open, serious, without_focus
 
 pytestmark = pytest.mark.needs_chromium
 PAGES = {
+    "start": "Start",
     "live": "Live",
     "capture": "Capture",
     "cameras": "Cameras",
+    "takes": "Takes",
     "compare": "Compare",
     "diagnose": "Diagnose",
     "fall": "Error fall",
@@ -24,21 +26,29 @@ LEAST_TARGET_PX = 44
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_everybody_can_use_it(opened: Open, address: str, name: str) -> None:
-    seen = opened(name)
+def test_everybody_can_use_it(opened: Open, address: str, trained: str, name: str) -> None:
+    seen = opened(f"{name}?models={trained}" if name == "compare" else name)
     page = seen.page
     expect(page.locator("h1")).to_have_text([PAGES[name]])
     assert page.locator("html").get_attribute("lang") == "en-US"
-    assert page.locator(f'nav a[href="/studio/{name}"]').get_attribute("aria-current") == "page"
+    link = page.get_by_role("navigation", name="Pages").locator(f'a[href^="/studio/{name}"]')
+    assert link.get_attribute("aria-current") == "page"
     page.locator(LAST_THERE.get(name, "h1")).first.wait_for()
     page.wait_for_timeout(500)
     assert serious(page) == []
     page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(500)
     assert "body--dark" in (page.locator("body").get_attribute("class") or "")
-    assert serious(page) == []
+    assert serious(page, COLOURS) == []
+    assert without_focus(page) == []
     page.set_viewport_size({"width": 390, "height": 844})
-    page.wait_for_timeout(300)
+    assert serious(page) == []
+    page.emulate_media(color_scheme="light")
+    page.wait_for_timeout(500)
+    assert serious(page, COLOURS) == []
+    navigation = page.locator("header").bounding_box()
+    assert navigation is not None
+    assert navigation["height"] < 844 / 4
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     small = page.evaluate(
         """least => [...document.querySelectorAll("#main button, nav a, header button")]

@@ -17,8 +17,8 @@ from studio_support import Open, serious
 
 from glovecal_service.demo.processes import DemoPlace, running_capture
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.emulators.emulation import Emulation
 from glovecal_service.emulators.hand import MovingHand
+from glovecal_service.emulators.ports import Emulation
 from glovecal_service.emulators.pseudo_terminal import PseudoTerminal
 from glovecal_service.serve import recorder
 from glovecal_service.settings import Settings

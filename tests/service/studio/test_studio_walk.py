@@ -25,9 +25,7 @@ def test_a_version_is_activated_and_rolled_back_by_keyboard(opened: Open, addres
     own = [each for each in own if each["layout"] == next(item for item in own if item["parent"])["layout"]]
     active, other = (next(each["id"] for each in own if each["active"] is flag) for flag in (True, False))
     page = opened("models").page
-    button = page.locator(f'[data-model="{other}"] button', has_text="Activate")
-    button.focus()
-    page.keyboard.press("Enter")
+    page.locator(f'[data-model="{other}"] button', has_text="Activate").press("Enter")
     expect(page.locator(f'[data-model="{other}"] .state-word')).to_have_text("active")
     layout = own[0]["layout"]
     now = [each for each in models(address, subject) if each["layout"] == layout]

@@ -19,12 +19,16 @@ from glovecal_models.calibration.training_settings import Method, TrainingSettin
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import evaluation_segment
-from glovecal_models.simulation.simulated_glove import SimulatedGlove
-from glovecal_models.simulation.simulated_take import simulate_take
-from glovecal_service.vendor_calibrations import asr, shadow_points, virtualhand
+from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
+from glovecal_service.vendor_calibrations import cyberglove
 from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
-from glovecal_service.vendor_calibrations.formats import FORMATS, calibration_format
-from glovecal_service.vendor_calibrations.line_model import read_model, write_model
+from glovecal_service.vendor_calibrations.formats import (
+    FORMATS,
+    calibration_format,
+    read_model,
+    write_model,
+)
+from glovecal_service.vendor_calibrations.shadow import lines_through
 
 LAYOUT22, LUCID = Layout.built_in("cyberglove22"), Layout.built_in("lucidglove")
 EIGHT, TWELVE = Counts(1.0, 255.0), Counts(1.0, 4095.0)
@@ -95,21 +99,21 @@ def test_virtualhand_in_the_makers_own_words() -> None:
         + "".join("{} {} {} 1\n".format(row, *rows.get((group, row), (0, 0.0))) for row in range(4))
         for group in range(6)
     )
-    found = virtualhand.read(text, EIGHT, "right").lines
+    found = cyberglove.read_virtualhand(text, EIGHT, "right").lines
     assert set(found) == {"I_MCP", "IM_ABD", "W_ABD"}
     assert found["I_MCP"].gain * (170 - found["I_MCP"].zero) == pytest.approx(math.degrees(100 * 0.018))
     assert found["IM_ABD"].gain * (150 - found["IM_ABD"].zero) == pytest.approx(math.degrees(50 * 0.012))
-    left = virtualhand.read(text, EIGHT, "left").lines
+    left = cyberglove.read_virtualhand(text, EIGHT, "left").lines
     assert left["W_ABD"].gain == -found["W_ABD"].gain
     assert left["IM_ABD"].gain == found["IM_ABD"].gain
-    finer = virtualhand.read(text, TWELVE, "right").lines["I_MCP"]
+    finer = cyberglove.read_virtualhand(text, TWELVE, "right").lines["I_MCP"]
     assert finer.gain * (16 * 170 - finer.zero) == pytest.approx(math.degrees(100 * 0.018))
 
 
 def test_asr_begins_at_the_wrist_and_bends_with_negative_radians() -> None:
     rows = ["0.0:60.0 0.0:144.0"] * 22
-    rows[asr.ORDER.index("I_MCP")] = "0.000000:71.000000 -1.500000:170.000000"
-    found = asr.read("\n".join(rows), EIGHT, "right")
+    rows[cyberglove.ORDER.index("I_MCP")] = "0.000000:71.000000 -1.500000:170.000000"
+    found = cyberglove.read_asr("\n".join(rows), EIGHT, "right")
     assert found.lines["I_MCP"].reading(0.0) == pytest.approx(71.0)
     assert found.lines["I_MCP"].reading(math.degrees(1.5)) == pytest.approx(170.0)
     assert found.left_out["PALM_ARCH"] == "both points tell one angle or one reading"
@@ -120,8 +124,8 @@ def test_asr_abductions_fall_as_fingers_spread() -> None:
     rows = ["0.0:60.0 0.0:144.0"] * 22
     falling, rising = "-0.2:180.0 0.3:70.0", "0.4:140.0 -0.1:60.0"
     for sensor, row in (("TI_ABD", falling), ("IM_ABD", falling), ("MR_ABD", rising), ("RP_ABD", rising)):
-        rows[asr.ORDER.index(sensor)] = row
-    found = asr.read("\n".join(rows), EIGHT, "right")
+        rows[cyberglove.ORDER.index(sensor)] = row
+    found = cyberglove.read_asr("\n".join(rows), EIGHT, "right")
     assert len(found.lines) == 4
     assert all(line.gain < 0 for line in found.lines.values())
 
@@ -143,7 +147,7 @@ def test_shadow_leaves_out_what_is_no_line_or_was_switched_off() -> None:
         "G_PalmArch": [(-0.001, 0.0), (0.0, 40.0)],
         "G_Elbow": [(0.0, 0.0), (1.0, 1.0)],
     }
-    found = shadow_points.lines_through(points, EIGHT)
+    found = lines_through(points, EIGHT)
     assert set(found.lines) == {"I_MCP"}
     assert found.lines["I_MCP"].reading(90.0) == pytest.approx(1 + 254 * 0.75)
     assert "degrees from a line" in found.left_out["I_PIP"]

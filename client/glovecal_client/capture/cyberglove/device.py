@@ -2,13 +2,18 @@
 
 Written from public drivers and manuals; no hardware was at hand. It speaks the 8-bit binary protocol:
 readings are counts from 1 to 255, about a degree each, in the order of the layout.
+
+Its stream ends in several ways without the port going away. A cable pulled between the adapter and the box is
+plain silence; a glove pulled from its box gives error records; a port taken over by something else gives
+garbage. Only time spent waiting counts, so a caller that was busy elsewhere does not make the glove look
+lost.
 """
 
 from __future__ import annotations
 
 import logging
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -17,17 +22,18 @@ import numpy as np
 from glovecal_client.capture.cyberglove import find_port
 from glovecal_client.capture.cyberglove.box import Unanswered
 from glovecal_client.capture.cyberglove.connection import BAUD_RATES, connect
-from glovecal_client.capture.cyberglove.identity import Identity, identify
-from glovecal_client.capture.cyberglove.options import OPTION_HELP, CyberGloveOptions
-from glovecal_client.capture.cyberglove.order import SENSORS, layout_index
-from glovecal_client.capture.cyberglove.rate import DEFAULT_RATE_HZ
+from glovecal_client.capture.cyberglove.identity import SENSORS, Identity, identify, layout_index
 from glovecal_client.capture.cyberglove.record import TICKS_PER_SECOND, Record, RecordReader
-from glovecal_client.capture.cyberglove.setup import StreamSetup, set_up
-from glovecal_client.capture.cyberglove.watch import StreamWatch
+from glovecal_client.capture.cyberglove.setup import (
+    DEFAULT_RATE_HZ,
+    OPTION_HELP,
+    CyberGloveOptions,
+    StreamSetup,
+    set_up,
+)
 from glovecal_client.capture.device import Reading
-from glovecal_client.capture.device_clock import DeviceClock
+from glovecal_client.capture.device_clock import ArrivalTimes, DeviceClock
 from glovecal_client.capture.serial_link import SerialLink
-from glovecal_client.capture.stream.arrival_times import ArrivalTimes
 from glovecal_client.clock import clock_ns, wall_ns
 from glovecal_client.errors import DeviceError, DeviceLost, reason_of
 
@@ -55,6 +61,8 @@ class CyberGlove:
     context: tuple[str, ...] = ()
     counts: tuple[float, float] = (1.0, 255.0)
     option_help = OPTION_HELP
+    usage = "cyberglove:PORT"
+    about = "CyberGlove I or II on a serial port: counts from 1 to 255."
 
     def __init__(self, port: str | None = None, options: CyberGloveOptions | None = None) -> None:
         self.port = port
@@ -179,7 +187,9 @@ class CyberGlove:
             try:
                 data = link.read(max(0.0, min(_WAIT_S, deadline - now)))
                 records = self._reader.feed(data)
-                self._watch.note(time.monotonic() - now, bool(data), bool(records), self._reader.errors)
+                # a computer too busy to wake this process in time says nothing about the glove
+                waited_s = min(_WAIT_S, time.monotonic() - now)
+                self._watch.note(waited_s, bool(data), bool(records), self._reader.errors)
                 self._keep_alive(link)
             except DeviceLost:
                 self._let_go()
@@ -224,3 +234,59 @@ class CyberGlove:
         self._ready.clear()
         if link is not None:
             link.close()
+
+
+_NUDGE_S, _SILENT_S, _UNPLUGGED_S, _GARBAGE_S = 0.2, 0.4, 0.25, 2.0
+
+
+class StreamWatch:
+    """``period_s`` is the time between records; slow streams are given several of them."""
+
+    def __init__(self, period_s: float) -> None:
+        self._nudge_s = max(_NUDGE_S, 2.5 * period_s)
+        self._silent_s = max(_SILENT_S, 5 * period_s)
+        self._unplugged_s = max(_UNPLUGGED_S, 2.5 * period_s)
+        self._garbage_s = max(_GARBAGE_S, 5 * period_s)
+        self._silent_for_s = 0.0
+        self._useless_for_s = 0.0
+        self._errors: Counter[str] = Counter()
+        self._errors_before: Counter[str] = Counter()
+        self._nudged = False
+
+    def note(self, waited_s: float, bytes_came: bool, records_came: bool, errors: Counter[str]) -> None:
+        """After each wait: how long it was, what it brought, and the reader's error counts so far."""
+        self._errors = errors
+        self._silent_for_s = 0.0 if bytes_came else self._silent_for_s + waited_s
+        if bytes_came:
+            self._nudged = False
+        if records_came:
+            self._useless_for_s = 0.0
+            self._errors_before = Counter(errors)
+        else:
+            self._useless_for_s += waited_s
+
+    def should_nudge(self) -> bool:
+        """True once per silence: time to apply the port's settings again and ask for the stream anew."""
+        if self._nudged or self._silent_for_s < self._nudge_s:
+            return False
+        self._nudged = True
+        return True
+
+    def lost_because(self) -> str:
+        """Why the stream counts as lost, empty while it does not."""
+        if self._silent_for_s >= self._silent_s:
+            return (
+                f"no bytes for {self._silent_for_s:.1f} s: "
+                "is the control box switched on and its cable plugged in?"
+            )
+        since = self._errors - self._errors_before
+        if self._useless_for_s >= self._unplugged_s and (since["g"] or since["zero"]):
+            return "the control box says that the glove is not plugged into it"
+        if self._useless_for_s >= self._unplugged_s and since["s"]:
+            return "the control box says that the sampling rate is too fast: give a lower rate"
+        if self._useless_for_s >= self._garbage_s:
+            return (
+                f"only unreadable bytes for {self._useless_for_s:.1f} s: "
+                "the baud rate has changed or another device took the port"
+            )
+        return ""

@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from glovecal_client.capture.cyberglove.box import ControlBox
-from glovecal_client.capture.cyberglove.connection import BAUD_RATES, ask_sensors
+from glovecal_client.capture.cyberglove.connection import BAUD_RATES, Heard, ask_sensors, explain, kind_of
 from glovecal_client.capture.cyberglove.identity import identify
 from glovecal_client.capture.cyberglove.record import RecordFormat, RecordReader
-from glovecal_client.capture.cyberglove.verdict import Heard, explain, kind_of
 from glovecal_client.capture.serial_link import SerialLink, import_pyserial
 from glovecal_client.errors import DeviceError, DeviceLost
 

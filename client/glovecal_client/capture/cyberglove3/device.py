@@ -8,16 +8,21 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from glovecal_client.capture.cyberglove.order import SENSORS, hardware_order
-from glovecal_client.capture.cyberglove3.card_commands import COMMANDS, run_command
-from glovecal_client.capture.cyberglove3.conversation import START, STOP, battery_volts, command, quiet
+from glovecal_client.capture.cyberglove.identity import SENSORS, hardware_order
+from glovecal_client.capture.cyberglove3.commands import (
+    COMMANDS,
+    START,
+    STOP,
+    battery_volts,
+    command,
+    quiet,
+    run_command,
+)
 from glovecal_client.capture.cyberglove3.record import LARGEST, TimedRecordReader
-from glovecal_client.capture.device_clock import DeviceClock
-from glovecal_client.capture.own_clock import OwnClock
+from glovecal_client.capture.device_clock import DeviceClock, OwnClock
 from glovecal_client.capture.stream.links import Link
-from glovecal_client.capture.stream.option_values import COMMON_HELP, OptionValues
 from glovecal_client.capture.stream.parser import Counters, Sample, StreamParser
-from glovecal_client.capture.stream.streamed_glove import StreamedGlove
+from glovecal_client.capture.stream.streamed_glove import COMMON_HELP, OptionValues, StreamedGlove
 from glovecal_client.errors import BadOption
 
 _LOW_BATTERY_V = 6.8
@@ -32,6 +37,8 @@ class CyberGlove3(StreamedGlove):
     name = "cyberglove3"
     counts: tuple[float, float] | None = (1.0, float(LARGEST))
     commands: ClassVar[dict[str, str]] = COMMANDS
+    usage = "cyberglove3:PORT"
+    about = "CyberGlove III on its USB port; cyberglove3:tcp:5210 over WiFi. Counts from 1 to 4095."
     option_help: ClassVar[dict[str, str]] = {
         "layout": f"{'|'.join(LAYOUTS)} (cyberglove3-22)",
         "multiplier": "1|2|3|4 (3): records for each frame of its clock; 4 may lose records over WiFi",

@@ -14,9 +14,7 @@ import numba
 import numpy as np
 
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
-from glovecal_models.colour_glove.pose.boundaries import boundaries
-from glovecal_models.colour_glove.pose.gaussian_step import Belief, cost, damped_step
-from glovecal_models.colour_glove.pose.vertex_motion import pixel_motion
+from glovecal_models.colour_glove.pose.window_step import Belief, boundaries, cost, damped_step, pixel_motion
 from glovecal_models.colour_glove.pose.window_view import (
     CELLS,
     DRAWN_POINTS,

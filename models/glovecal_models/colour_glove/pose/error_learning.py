@@ -4,6 +4,8 @@ The paper learns R, Q and P on a recorded sequence about local averages of its o
 rendered hands have a truth, and errors that last are errors too. All is learned on drawn photographs, with an
 arm, a face and a room, whose colours are classified. Kept beside the database: the same hand, database and
 cameras are learned once.
+
+A tracker for one hand and its cameras, from what is kept in a folder; the first time it is built there.
 """
 
 from __future__ import annotations
@@ -21,21 +23,27 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
-from glovecal_models.colour_glove.database import DatabaseSettings
-from glovecal_models.colour_glove.drawn.hand_motion import CONE_DEG, hand_motion
-from glovecal_models.colour_glove.drawn.photograph import (
+from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, STAGES, HandState
+from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
+from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.photograph import (
+    CONE_DEG,
     Photographer,
     Photography,
+    hand_motion,
     labelled_photographs,
 )
-from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
-from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.white_balance import Gains
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
-from glovecal_models.colour_glove.pose.learned_errors import LearnedErrors, fitted_scale, scale_name
+from glovecal_models.colour_glove.pose.hand_tracker import (
+    HandTracker,
+    LearnedErrors,
+    fitted_scale,
+    scale_name,
+)
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
-from glovecal_models.colour_glove.pose_estimate import STAGES
+from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput
@@ -142,15 +150,15 @@ def learned_errors(
         except BadInput:
             file.unlink()
     said = part(report, 0.0, 0.25)
-    colours = drawn_colours(hand)
-    job = partial(_blend_errors, hand, lookup, cameras, spread, colours)
+    scene = _Scene(hand, cameras, spread, drawn_colours(hand))
+    job = partial(_blend_errors, scene, lookup)
     steps = _over_clips(job, clips, workers, said, cancelled)
     blends = np.concatenate(steps)
     covariance = blends.T @ blends / len(blends) + np.eye(DEGREES_OF_FREEDOM)
     speed = _speed(hand.skin, clips)
     first = LearnedErrors.as_posterior(covariance, speed)
     said = part(report, 0.25, 0.6)
-    job = partial(_errors_alone, hand, lookup, cameras, spread, colours, first)
+    job = partial(_errors, scene, lookup, first, STAGES, False)
     alone = _over_clips(job, clips, workers, said, cancelled)
     scales = {}
     for stage in STAGES:
@@ -163,7 +171,7 @@ def learned_errors(
     )
     said = part(report, 0.6, 1.0)
     # A followed answer differs from one alone only while a hand is followed: half the clips tell enough.
-    job = partial(_errors_followed, hand, lookup, cameras, spread, colours, first)
+    job = partial(_errors, scene, lookup, first, ("ik", "dense"), True)
     followed = _over_clips(job, -(-clips // 2), workers, said, cancelled)
     for stage in ("ik", "dense"):
         scales[scale_name(stage, True)] = fitted_scale(*_joined(followed, stage))
@@ -211,12 +219,20 @@ class _Clip:
     seconds: np.ndarray
 
 
-def _clip(
-    hand: PrintedHand, cameras: Sequence[Camera], spread: ShapeSpread, colours: ColourTable, seed: int,
-    frames: int, rate_hz: float, cone_deg: float = CONE_DEG,
-) -> _Clip:  # fmt: skip
-    """Photographs of a hand of its own, their colours classified."""
-    other, rng = other_hand(hand.skin, seed, spread), np.random.default_rng([seed, 4])
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What is photographed: a hand of its own in every clip, not farther than ``spread`` from the model's."""
+
+    hand: PrintedHand
+    cameras: Sequence[Camera]
+    spread: ShapeSpread
+    colours: ColourTable
+
+
+def _clip(scene: _Scene, seed: int, frames: int, rate_hz: float, cone_deg: float = CONE_DEG) -> _Clip:
+    """Photographs, their colours classified."""
+    hand, cameras = scene.hand, scene.cameras
+    other, rng = other_hand(hand.skin, seed, scene.spread), np.random.default_rng([seed, 4])
     seconds = np.arange(frames) / rate_hz
     states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed, cone_deg=cone_deg)[:frames]
     look = Photography(exposure=float(rng.uniform(0.8, 1.1)), arm=("skin", "sleeve")[seed % 2])
@@ -235,7 +251,7 @@ def _clip(
             continue
         until = _at_the_end_of_exposure(states, index, rate_hz)
         taken = [room.photograph(state, until, number=index).picture for room in rooms]
-        pictures.append([colours.labels(picture) for picture in taken])
+        pictures.append([scene.colours.labels(picture) for picture in taken])
     kept = [index for index, views in enumerate(pictures) if views is not None]
     return _Clip([states[i] for i in kept], [pictures[i] for i in kept], seconds[kept])
 
@@ -247,18 +263,16 @@ def _at_the_end_of_exposure(states: Sequence[HandState], index: int, rate_hz: fl
     return states[index].moved(_EXPOSURE_S * rate_hz * states[index + 1].step_from(states[index]))
 
 
-def _blend_errors(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
-    colours: ColourTable, clip: int,
-) -> np.ndarray:  # fmt: skip
+def _blend_errors(scene: _Scene, lookup: PoseLookup, clip: int) -> np.ndarray:
     """(N, 26), of hands turned as far as the database's are."""
     plain = LearnedErrors.as_posterior(np.eye(DEGREES_OF_FREEDOM), np.ones(DEGREES_OF_FREEDOM))
-    tracker = HandTracker(hand, lookup, cameras[:1], plain, stage="blend")
+    scene = replace(scene, cameras=scene.cameras[:1])
+    tracker = HandTracker(scene.hand, lookup, scene.cameras, plain, stage="blend")
     frames, cone_deg = (2 * _APART[0], _APART[1]), DatabaseSettings().cone_deg
-    made = _clip(hand, cameras[:1], spread, colours, 1000 + clip, *frames, cone_deg)
+    made = _clip(scene, 1000 + clip, *frames, cone_deg)
     steps = []
     for state, views in zip(made.states, made.pictures, strict=True):
-        glimpse = tracker.glimpse(views[0], cameras[0])
+        glimpse = tracker.glimpse(views[0], scene.cameras[0])
         if glimpse is not None:
             steps.append(state.step_from(glimpse.blend.state))
     return np.array(steps).reshape(-1, DEGREES_OF_FREEDOM)
@@ -267,29 +281,13 @@ def _blend_errors(
 _Errors = dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
-def _errors_alone(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
-    colours: ColourTable, errors: LearnedErrors, clip: int,
-) -> _Errors:  # fmt: skip
-    return _errors(hand, lookup, cameras, spread, colours, errors, clip, STAGES, False, _APART)
-
-
-def _errors_followed(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
-    colours: ColourTable, errors: LearnedErrors, clip: int,
-) -> _Errors:  # fmt: skip
-    return _errors(hand, lookup, cameras, spread, colours, errors, clip, ("ik", "dense"), True, _CLOSE)
-
-
 def _errors(
-    hand: PrintedHand, lookup: PoseLookup, cameras: Sequence[Camera], spread: ShapeSpread,
-    colours: ColourTable, errors: LearnedErrors, clip: int, stages: Sequence[str], follows: bool,
-    frames: tuple[int, float],
-) -> _Errors:  # fmt: skip
+    scene: _Scene, lookup: PoseLookup, errors: LearnedErrors, stages: Sequence[str], follows: bool, clip: int
+) -> _Errors:
     """Per stage: errors (N, 26), posterior deviations (N, 26), disagreeing shares (N,)."""
-    made, found = _clip(hand, cameras, spread, colours, 2000 + clip, *frames), {}
+    made, found = _clip(scene, 2000 + clip, *(_CLOSE if follows else _APART)), {}
     for stage in stages:
-        tracker = HandTracker(hand, lookup, cameras, errors, stage=stage, follows=follows)
+        tracker = HandTracker(scene.hand, lookup, scene.cameras, errors, stage=stage, follows=follows)
         rows = defaultdict(list)
         for state, views, seconds in zip(made.states, made.pictures, made.seconds, strict=True):
             answer = tracker.answered(views, float(seconds))
@@ -319,3 +317,32 @@ def _speed(skin: HandSkin, clips: int) -> np.ndarray:
         states = hand_motion(skin, _CLOSE[0] / _CLOSE[1], _CLOSE[1], seed=3000 + clip)
         steps += [later.step_from(before) for before, later in pairwise(states)]
     return np.sqrt(np.square(steps).mean(axis=0)) * _CLOSE[1]
+
+
+def prepared_tracker(
+    folder: Path,
+    cameras: Sequence[Camera] = (Camera(),),
+    *,
+    hand: PrintedHand | None = None,
+    spread: ShapeSpread = PEOPLE,
+    entries: int = ENTRIES,
+    clips: int = CLIPS,
+    report: Report | None = None,
+    cancelled: Cancel | None = None,
+) -> HandTracker:
+    """``hand``: the hand to be seen, in its glove; without one the assumed right hand in the glove that
+    ``glovecal camera sheets`` prints. ``spread``: how far the hand may be from that.
+
+    The database takes about half a minute on two cores, what is learned of its errors a minute; afterwards
+    both are read. Raises BadInput, Cancelled.
+    """
+    hand = PrintedHand(hand_skin(), printed_pattern()) if hand is None else hand
+    database = pose_database(
+        hand.skin, hand.pattern, generated_poses(PAPER_COUNT), folder, DatabaseSettings(entries=entries),
+        report=part(report, 0.0, 0.3), cancelled=cancelled,
+    )  # fmt: skip
+    lookup = PoseLookup(database, pca_code(database.transforms))
+    errors = learned_errors(
+        hand, lookup, cameras, spread=spread, clips=clips, report=part(report, 0.3, 1.0), cancelled=cancelled
+    )
+    return HandTracker(hand, lookup, cameras, errors)

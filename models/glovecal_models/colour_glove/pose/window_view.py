@@ -98,10 +98,6 @@ class WindowView:
         """Points whose colours seen and drawn (``shown``) differ, and points of glove in either."""
         return differing(self.labels, shown, hand.patch_of, hand.colour_of, hand.is_cuff)
 
-    def to_px(self, points: np.ndarray, points_a_cell: int) -> np.ndarray:
-        """Places among a window's points (..., 2) as pixels of the picture."""
-        return (points + 0.5) * (self.cell_px / points_a_cell) + self.low_px
-
 
 @numba.njit(cache=True)
 def sampled(labels, low_u, low_v, step, count):  # type: ignore[no-untyped-def]

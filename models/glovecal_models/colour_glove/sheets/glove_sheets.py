@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 from matplotlib.path import Path as Curve
 
-from glovecal_models.colour_glove.palette import COLOUR_NAMES, PRINTED_SRGB
-from glovecal_models.colour_glove.pattern import Pattern
+from glovecal_models.colour_glove.pattern import COLOUR_NAMES, PRINTED_SRGB, Pattern
 from glovecal_models.colour_glove.sheets.flat_glove import FlatPiece, flat_pieces
 from glovecal_models.colour_glove.sheets.sheet import GREY, MARGIN_MM, Box, Sheet
 from glovecal_models.colour_glove.skin import HandSkin

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glovecal_models.diagnosis.detectability.answer import Confusability, PairOfEffects
 from glovecal_models.diagnosis.detectability.injection import (
     VISIBLE_SHARE,
     columns_of,
@@ -21,10 +22,10 @@ from glovecal_models.diagnosis.detectability.injection import (
 )
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.limits import DiagnosisLimits
-from glovecal_models.diagnosis.next_take import NextTake, next_take
+from glovecal_models.diagnosis.next_take import next_take
 from glovecal_models.diagnosis.problem import DiagnosisProblem
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.catalogue import candidates
+from glovecal_models.effects.base.effect import CorrectionEffect, Effect, why_not_shown
+from glovecal_models.effects.catalogue import candidates, relations
 
 SMALL_DELAY_S = 0.02
 KEPT_SHARE = 0.99
@@ -34,54 +35,19 @@ ROWS_LOOKED_AT = 4000
 """Of one rotation; rows are alike in time, so every k-th does."""
 
 
-@dataclass(frozen=True)
-class PairOfEffects:
-    """Two effects on the rotation where they are most alike."""
-
-    effects: tuple[str, str]
-    """The second imitates the first better than the other way round."""
-    rotation: str
-    correlation: float
-    """0 to 1."""
-    is_confused: bool
-    """Whether it is above the limit."""
-    next_take: NextTake | None = None
-    """The recording that tells them apart, where they are confused."""
-
-
-@dataclass(frozen=True)
-class Confusability:
-    """All pairs of effects of one session."""
-
-    effects: tuple[str, ...]
-    """Those that were compared."""
-    pairs: tuple[PairOfEffects, ...]
-    """The most alike first."""
-    condition: Mapping[str, float]
-    """By rotation: of all effects together; 1 means that none is like another, infinite that two are one."""
-    condition_of_others: Mapping[str, float]
-    """The same without the first of each confused pair: what more than two effects together hide."""
-    not_applicable: Mapping[str, str]
-    """Effects that these takes cannot show, and why."""
-    limits: DiagnosisLimits
-
-    @property
-    def confused(self) -> tuple[PairOfEffects, ...]:
-        return tuple(pair for pair in self.pairs if pair.is_confused)
-
-
 def confusability(
     problem: DiagnosisProblem, effects: Sequence[Effect] | None = None, declared: Sequence[Effect] = ()
 ) -> Confusability:
     """``effects``: None for the whole catalogue, those ``declared`` by a user and every context column."""
     design = problem.design()
     every = candidates(design.signals, declared) if effects is None else list(effects)
-    has = {name for item in problem.known for name in (item.effect.name, *item.effect.alike)}
+    known = [item.effect.name for item in problem.known]
+    has = {other for name in known for other in (name, *relations().alike_to(name))}
     found, why = [], {}
     for item in every:
-        if item.stage != "compared" or item.name in has or not (item.has_columns or is_delay(item)):
+        if item.name in has or not (isinstance(item, CorrectionEffect) or is_delay(item)):
             continue
-        reason = item.not_applicable_reason(design.signals)
+        reason = why_not_shown(item, design.signals)
         if reason is None:
             found.append(item)
         else:
@@ -105,10 +71,10 @@ def confusability(
     return Confusability(
         tuple(by_name),
         tuple(_decided(pair, by_name) for pair in ordered),
-        condition,
-        of_others,
+        _finite(condition),
+        _finite(of_others),
         why,
-        problem.limits,
+        problem.limits.confused_condition,
     )
 
 
@@ -130,7 +96,7 @@ class _Directions:
 
 def _directions(design: ForwardDesign, effect: Effect, joint: int) -> _Directions | None:
     """None where the static map explains all that it adds."""
-    if is_delay(effect):
+    if not isinstance(effect, CorrectionEffect):
         moved = delayed_by(design.signals, joint, SMALL_DELAY_S)
         parts, prior = [part[:, None] for part in moved], np.ones(1)
     else:
@@ -171,6 +137,10 @@ def _condition(directions: Sequence[_Directions]) -> float:
         return float("inf")
     sizes = np.linalg.svd(every, compute_uv=False)
     return float(sizes[0] / sizes[-1]) if sizes[-1] > SINGULAR * sizes[0] else float("inf")
+
+
+def _finite(conditions: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: value if np.isfinite(value) else None for name, value in conditions.items()}
 
 
 def _decided(pair: PairOfEffects, effects: Mapping[str, Effect]) -> PairOfEffects:

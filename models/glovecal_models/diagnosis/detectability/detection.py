@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from glovecal_models.diagnosis.detectability.answer import (
+    Confusability,
+    Control,
+    Detectable,
+    EffectDetectability,
+    Outcome,
+    SizeTried,
+    Trial,
+)
+from glovecal_models.diagnosis.detectability.confusability import confusability
 from glovecal_models.diagnosis.detectability.injection import (
     injected,
     injected_takes,
@@ -17,83 +27,130 @@ from glovecal_models.diagnosis.detectability.injection import (
 )
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
 from glovecal_models.diagnosis.diagnosis import Diagnosis
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.effects.base.effect import Effect
-from glovecal_models.progress import Cancel
+from glovecal_models.effects.catalogue import catalogue, effect
+from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
+from glovecal_models.parts import Part, Parted
+from glovecal_models.presentation.document import answer
+from glovecal_models.progress import Cancel, Report
 
-Outcome = Literal["named", "ambiguous", "mistaken", "not found"]
 SIZES_DEG = (0.5, 1.0, 2.0, 4.0)
 TRIALS = 3
-BOUND_LEVEL = 0.95
+MOST_DIAGNOSES = 5000
+TRIALS_VERSION = 2
+"""Of the trials: results of another one are not used again."""
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One diagnosis of the session with an effect put in."""
+@answer
+class Alike:
+    """Of a session, before anything is put in."""
 
-    outcome: Outcome
-    named: tuple[str, ...]
-    """The confidence set, the effect named first in front; empty where nothing was named."""
-
-
-@dataclass(frozen=True)
-class SizeTried:
-    """All trials of one size."""
-
-    size_deg: float
-    trials: tuple[Trial, ...]
-    """Empty: these takes cannot hold so much of the effect."""
-
-    def count(self, *outcomes: Outcome) -> int:
-        return sum(trial.outcome in outcomes for trial in self.trials)
-
-    def share(self, *outcomes: Outcome) -> float:
-        return self.count(*outcomes) / max(len(self.trials), 1)
-
-    @property
-    def mistaken_for(self) -> Mapping[str, int]:
-        """Effects named instead, and how often."""
-        return Counter(trial.named[0] for trial in self.trials if trial.outcome == "mistaken")
+    confusability: Confusability
+    residual_deg: Mapping[str, float | None]
 
 
-@dataclass(frozen=True)
-class Detectability:
-    """How large one effect has to be on some rotations to be named in this session."""
+@answer
+class Tried:
+    """Trials of one effect at one size."""
 
-    effect: str
-    rotations: tuple[str, ...]
-    """On which it was put in, all at once."""
-    sizes: tuple[SizeTried, ...] = ()
+    rotations: Sequence[str]
+    trials: Sequence[Trial]
     why_not: str | None = None
-    """Why it cannot be put in or found; no size was tried then."""
-
-    def size_deg(self, probability: float, *outcomes: Outcome) -> float | None:
-        """The smallest size that ends in one of ``outcomes`` with ``probability``; None: none that was tried.
-
-        Shares of trials, made monotone in size and interpolated over its logarithm. Where the smallest size
-        that was tried does, that size: it may be smaller.
-        """
-        tried = [item for item in self.sizes if item.trials]
-        shares = _monotone([item.share(*outcomes) for item in tried], [len(item.trials) for item in tried])
-        for number, (item, share) in enumerate(zip(tried, shares, strict=True)):
-            if share < probability:
-                continue
-            if number == 0:
-                return item.size_deg
-            before, low = tried[number - 1].size_deg, shares[number - 1]
-            part = (probability - low) / (share - low)
-            return float(np.exp(np.log(before) + part * (np.log(item.size_deg) - np.log(before))))
-        return None
 
 
 @dataclass(frozen=True)
-class Control:
-    """The same trials with nothing put in: what is named then is named by chance, or for want of fit."""
+class Detection(Parted[Detectable]):
+    """Effects of known size put into takes that are made perfect otherwise, and diagnosed again."""
 
-    trials: tuple[Trial, ...]
+    on: ModelOnTakes
+    effects: Sequence[str] | None = None
+    """Names, of the catalogue or declared in ``on``; None: every effect that a diagnosis compares."""
+    places: Sequence[Sequence[str]] | None = None
+    """Rotations that an effect is put into at once, one set after the other; None: all."""
+    sizes_deg: Sequence[float] = SIZES_DEG
+    trials: int = TRIALS
+    """For each size."""
+    seed: int = 0
 
-    @property
-    def named(self) -> Mapping[str, int]:
-        return Counter(trial.named[0] for trial in self.trials if trial.named)
+    def require(self) -> None:
+        """Raises BadInput for an effect or a rotation that there is not, and for too many diagnoses."""
+        self.parts()
+
+    def parts(self) -> list[Part]:
+        common = {"seed": self.seed, "trials": self.trials, "version": TRIALS_VERSION}
+        pieces = [
+            Part(
+                "comparing effects with each other", Alike, {"part": "alike", "version": TRIALS_VERSION}, 0.5
+            ),
+            Part("trials with nothing put in", Tried, {"part": "nothing", **common}, self.trials),
+        ]
+        for name, where in self._targets():
+            on = "" if where is None else f" on {', '.join(where)}"
+            for size in sorted(set(self.sizes_deg)):
+                facts = {"effect": name, "rotations": where, "size_deg": size, **common}
+                pieces.append(Part(f"{name}{on} of {size:g} degrees", Tried, facts, self.trials))
+        if len(pieces) * self.trials > MOST_DIAGNOSES:
+            raise BadInput(
+                f"{len(pieces) * self.trials} diagnoses are too many; name fewer effects, rotations or sizes"
+            )
+        return pieces
+
+    def run(self, piece: Part, cancelled: Cancel | None, report: Report | None) -> Alike | Tried:
+        session, facts = self._session, piece.facts
+        if piece.gives is Alike:
+            size = np.sqrt(np.nanmean(np.concatenate(session.residual) ** 2, axis=0))
+            return Alike(
+                confusability(session.problem, declared=session.on.own),
+                dict(zip(session.rotations, map(float, size), strict=True)),
+            )
+        put_in = self._effect(facts["effect"]) if "effect" in facts else None
+        where = where_injected(session, put_in, facts.get("rotations"))
+        why = None if put_in is None else why_not_injected(session, put_in)
+        found = []
+        for number in range(self.trials if why is None else 0):
+            if report is not None:
+                report(f"trial {number + 1}", number / self.trials)
+            size_deg, seed = facts.get("size_deg", 0.0), self.seed + number
+            found.append(trial(session, put_in, where, size_deg, seed=seed, cancelled=cancelled))
+        return Tried(where, [item for item in found if item is not None], why)
+
+    def answer(self, pieces: Sequence[Any]) -> Detectable:
+        alike, nothing, *tried = pieces
+        sizes = sorted(set(self.sizes_deg))
+        effects: list[EffectDetectability] = []
+        for number, (name, _) in enumerate(self._targets()):
+            each = tried[number * len(sizes) : (number + 1) * len(sizes)]
+            why = each[0].why_not
+            found = [SizeTried.of(size, item.trials, name) for size, item in zip(sizes, each, strict=True)]
+            item = EffectDetectability(name, each[0].rotations, () if why else found, why)
+            if item not in effects:  # a delay is on all rotations, whichever was asked for
+                effects.append(item)
+        return Detectable(
+            trials=self.trials,
+            residual_deg=alike.residual_deg,
+            effects=sorted(effects, key=lambda item: item.why_not is not None),
+            control=Control.of(nothing.trials),
+            confusability=alike.confusability,
+        )
+
+    @cached_property
+    def _session(self) -> SurrogateSession:
+        return SurrogateSession.of(self.on)
+
+    def _targets(self) -> list[tuple[str, Sequence[str] | None]]:
+        names = self.effects
+        if names is None:
+            names = [item.name for item in catalogue().values() if item.comparison is not None]
+        for rotation in {name for where in self.places or () for name in where}:
+            if rotation not in self.on.layout.rotations:
+                meant = did_you_mean(rotation, self.on.layout.rotations)
+                raise BadInput(f"no rotation {rotation!r} in this layout; {meant}")
+        return [(self._effect(name).name, where) for name in names for where in self.places or (None,)]
+
+    def _effect(self, name: str) -> Effect:
+        return next((item for item in self.on.own if item.name == name), None) or effect(name)
 
 
 def trial(
@@ -130,56 +187,9 @@ def _outcome(found: Diagnosis, effect: str | None, rotations: Sequence[str]) -> 
     """It counts as found where it is significant on a rotation that it was put in."""
     members = found.naming.confidence_set
     if not members:
-        return "not found"
+        return "not_found"
     item = next((item for item in found.naming.ranked if item.effect == effect), None)
     where = set() if item is None else {item.joints[i] for i in item.significant_joints}
     if effect not in members or not where & set(rotations):
         return "mistaken"
     return "named" if len(members) == 1 else "ambiguous"
-
-
-def detectability(
-    session: SurrogateSession,
-    effect: Effect,
-    rotations: Sequence[str] | None = None,
-    sizes_deg: Sequence[float] = SIZES_DEG,
-    *,
-    trials: int = TRIALS,
-    seed: int = 0,
-    cancelled: Cancel | None = None,
-) -> Detectability:
-    """``rotations``: put in there at once; None: on all that have a sensor of their own.
-
-    Raises BadInput, Cancelled.
-    """
-    where = where_injected(session, effect, rotations)
-    why = why_not_injected(session, effect)
-    if why is not None:
-        return Detectability(effect.name, where, why_not=why)
-    found = []
-    for size in sorted(sizes_deg):
-        each = [
-            trial(session, effect, where, size, seed=seed + number, cancelled=cancelled)
-            for number in range(trials)
-        ]
-        found.append(SizeTried(size, tuple(item for item in each if item is not None)))
-    return Detectability(effect.name, where, tuple(found))
-
-
-def lowest_probability(trials: int) -> float:
-    """The one-sided lower 95 % bound of a probability that held in every one of so many trials."""
-    return (1 - BOUND_LEVEL) ** (1 / trials) if trials else 0.0
-
-
-def _monotone(shares: Sequence[float], weights: Sequence[int]) -> list[float]:
-    """The nearest shares that do not fall (pool adjacent violators)."""
-    pools: list[list[float]] = []
-    for share, weight in zip(shares, weights, strict=True):
-        pools.append([share, float(weight), 1.0])
-        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
-            value, size, count = pools.pop()
-            before = pools[-1]
-            before[0] = (before[0] * before[1] + value * size) / (before[1] + size)
-            before[1] += size
-            before[2] += count
-    return [value for value, _, count in pools for _ in range(int(count))]

@@ -14,11 +14,18 @@ import numpy as np
 
 from glovecal_models.diagnosis.detectability.surrogate_session import SurrogateSession
 from glovecal_models.diagnosis.known_effect import one_lane
-from glovecal_models.diagnosis.not_identifiable import SINGLE_POSES, undecidable
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, undecidable
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.effect import (
+    CorrectionEffect,
+    Effect,
+    is_between_takes,
+    kind_of,
+    needs_movement,
+    why_not_shown,
+)
+from glovecal_models.effects.base.signals import Settings, Signals
+from glovecal_models.effects.catalogue import relations
 from glovecal_models.takes.take import Take
 
 COMPARED_DELAY_S = 0.15
@@ -41,7 +48,7 @@ class Injected:
 def is_delay(effect: Effect) -> bool:
     """Whether it is repaired by shifting the reference, so that it can be put in by shifting it."""
     probe = Assessment(effect.name, ("",), (), (np.array([0.01]),), (np.empty(0),))
-    return effect.reference_delay_s(probe) is not None
+    return effect.comparison is not None and effect.comparison.reference_delay_s(probe) is not None
 
 
 def why_not_injected(session: SurrogateSession, effect: Effect) -> str | None:
@@ -49,22 +56,22 @@ def why_not_injected(session: SurrogateSession, effect: Effect) -> str | None:
 
     That does not depend on its size.
     """
-    if effect.kind == "nothing":
+    if kind_of(effect) == "nothing":
         return "it is the absence of any effect"
-    has = {name for item in session.on.known for name in (item.effect.name, *item.effect.alike)}
-    if effect.name in has:
+    has = [item.effect.name for item in session.on.known]
+    if effect.name in has or not set(has).isdisjoint(relations().alike_to(effect.name)):
         return "the model has it, or an effect like it, already"
-    if not effect.has_columns and not is_delay(effect):
+    if not isinstance(effect, CorrectionEffect) and not is_delay(effect):
         return "it is found by its signature in a recording, not by what it explains of the error"
     if not session.sensors and not is_delay(effect):
         return "no rotation has a working sensor of its own"
-    if effect.stage != "compared":
+    if effect.comparison is None:
         return "a diagnosis does not compare it with others"
-    if session.problem.is_sparse and effect.needs_movement:
+    if session.problem.is_sparse and needs_movement(effect):
         return SINGLE_POSES
     signals = session.design.signals
-    why = effect.not_applicable_reason(signals)
-    if why is None and effect.changes_between_takes:
+    why = why_not_shown(effect, signals)
+    if why is None and isinstance(effect, CorrectionEffect) and is_between_takes(effect):
         few = undecidable(signals, effect, session.limits)
         why = None if few is None else few.why
     return why
@@ -95,13 +102,13 @@ def injected(
     A delay is of that size over all rotations together. None where these takes cannot hold so much of it.
     Raises BadInput for a rotation that cannot be rewritten.
     """
-    if is_delay(effect):
+    if not isinstance(effect, CorrectionEffect):
         return _delayed(session, effect, size_deg, generator)
     added: dict[str, list[np.ndarray]] = {}
     for rotation in rotations:
         joint = session.joint(rotation)
         plain = columns_of(session.design.signals, session.design.known, effect, joint)
-        weights = effect.forward_weights(plain.settings, generator)
+        weights = effect.dynamics.drawn_weights(plain.prior_sd, generator)
         parts = [part @ weights for part in plain.parts]
         left = session.unexplained(joint, parts)
         rms = _rms(np.concatenate([part[np.isfinite(part)] for part in left]))
@@ -123,20 +130,20 @@ class EffectColumns:
 
 
 def columns_of(
-    signals: Sequence[Signals], known: Sequence[frozenset[str]], effect: Effect, joint: int
+    signals: Sequence[Signals], known: Sequence[frozenset[str]], effect: CorrectionEffect, joint: int
 ) -> EffectColumns:
     """``known``: for each joint, names among the other signals that its base reads already."""
     single = [one_lane(take, joint) for take in signals]
-    if effect.one_joint_at_a_time:
+    if effect.comparison.is_joint_by_joint:
         single = [
             replace(take, others={k: v for k, v in take.others.items() if k not in known[joint]})
             for take in single
         ]
     settings = effect.fit_constants(single)
-    grid = effect.grid(single, settings)
+    grid = effect.shape.grid(single, settings)
     shape = grid[len(grid) // 2]
     parts = [effect.columns(take, settings, shape)[:, 0, :] for take in single]
-    return EffectColumns(parts, effect.prior_sd(settings), settings)
+    return EffectColumns(parts, effect.weights(settings).prior_sd, settings)
 
 
 def delayed_by(signals: Sequence[Signals], joint: int, delay_s: float) -> list[np.ndarray]:
@@ -149,7 +156,7 @@ def _delayed(
     session: SurrogateSession, effect: Effect, size_deg: float, generator: np.random.Generator
 ) -> Injected | None:
     """One delay of all takes: what it adds grows with it."""
-    lowest = min((item.low for item in effect.parameters), default=-1.0)
+    lowest = min((item.low for item in effect.shape.parameters), default=-1.0)
     sign = 1.0 if lowest >= 0 else float(generator.choice([-1.0, 1.0]))
 
     def size(delay_s: float) -> float:

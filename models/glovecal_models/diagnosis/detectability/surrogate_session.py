@@ -15,8 +15,8 @@ import numpy as np
 from glovecal_models.diagnosis.forward_design import ForwardDesign
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
-from glovecal_models.diagnosis.posed_holds import are_pose_labels
 from glovecal_models.diagnosis.problem import DiagnosisProblem
+from glovecal_models.diagnosis.signatures import are_pose_labels
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.take import Take
 

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.joint_units import in_joint_units
+from glovecal_models.effects.base.signals import Settings, in_joint_units
 from glovecal_models.errors import BadInput
 
 IN_STEPS = "in_steps"

@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.effect import CorrectionEffect
+from glovecal_models.effects.base.signals import Settings, Signals
 from glovecal_models.errors import BadInput
 
 SHIFT_SHARE = (0.2, 0.8)
@@ -22,7 +21,7 @@ MOST_PERMUTATIONS = 200
 
 
 def control_columns(
-    effect: Effect,
+    effect: CorrectionEffect,
     takes: Sequence[Signals],
     settings: Settings,
     shape: np.ndarray,
@@ -37,24 +36,24 @@ def control_columns(
     wrong = control_signals(effect, takes, generator)
     if rows is not None:
         wrong = [take.at(some) for take, some in zip(wrong, rows, strict=True)]
-    if effect.control == "none":
-        return [np.zeros_like(part) for part in effect.columns_of_takes(wrong, settings, shape)]
-    step = -1 if effect.control == "time-reversed" else 1
-    return [part[::step] for part in effect.columns_of_takes(wrong, settings, shape)]
+    if effect.comparison.control == "none":
+        return [np.zeros_like(part) for part in effect.dynamics.columns_of_takes(wrong, settings, shape)]
+    step = -1 if effect.comparison.control == "time-reversed" else 1
+    return [part[::step] for part in effect.dynamics.columns_of_takes(wrong, settings, shape)]
 
 
 def control_signals(
-    effect: Effect, takes: Sequence[Signals], generator: np.random.Generator
+    effect: CorrectionEffect, takes: Sequence[Signals], generator: np.random.Generator
 ) -> list[Signals]:
     """Inputs of the effect that cannot be right: takes played backwards (their rows are then in reverse),
     shifted in time, or with the context or the wearing of other takes. Raises BadInput as above."""
-    if effect.control == "time-reversed":
+    if effect.comparison.control == "time-reversed":
         return [_reversed(take) for take in takes]
-    if effect.control == "circularly shifted":
+    if effect.comparison.control == "circularly shifted":
         return [_shifted(take, generator) for take in takes]
-    if effect.control == "context of other takes":
+    if effect.comparison.control == "context of other takes":
         return _with_other_context(takes, generator)
-    if effect.control == "permuted wearings":
+    if effect.comparison.control == "permuted wearings":
         return _with_permuted_wearings(takes, generator)
     return list(takes)
 

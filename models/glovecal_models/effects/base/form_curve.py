@@ -6,13 +6,14 @@ Numbers of training, kept with the form: a form's weights say nothing to a reade
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from glovecal_models.effects.base.learned_form import OWN
 from glovecal_models.errors import BadInput
+from glovecal_models.presentation.document import answer
 
 CURVE_BINS = 12
 LOW, HIGH = 0.1, 0.9
@@ -23,20 +24,20 @@ LARGEST_CURVES = 64
 OWN_UNIT = "deg"
 
 
-@dataclass(frozen=True)
+@answer
 class FormCurve:
     """What an effect adds to one joint, over one input in bins of as many frames each."""
 
     input: str
-    """As the effect names it; ``OWN`` for the joint's own angle."""
+    """As the effect names it; "own" for the joint's own angle."""
     unit: str
-    """Of the input; "" where it has none."""
+    """Of the input: "SD" of training, "deg", or "" where it has none."""
     at: tuple[float, ...]
     """(B,) mean of the input in each bin, rising."""
     mean_deg: tuple[float, ...]
-    """(B,)."""
+    """(B,) mean of what the effect adds."""
     low_deg: tuple[float, ...]
-    """(B,) 10 % quantile of the bin's frames."""
+    """(B,) 10 % quantile of it."""
     high_deg: tuple[float, ...]
     """(B,) 90 % quantile: wide where it depends on more than this input."""
     slope_deg_per_unit: float
@@ -64,17 +65,6 @@ class FormCurve:
             _short([slope])[0],
         )
 
-    def to_document(self) -> dict[str, Any]:
-        return {
-            "input": self.input,
-            "unit": self.unit,
-            "at": list(self.at),
-            "mean_deg": list(self.mean_deg),
-            "low_deg": list(self.low_deg),
-            "high_deg": list(self.high_deg),
-            "slope_deg_per_unit": self.slope_deg_per_unit,
-        }
-
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> FormCurve:
         """Raises KeyError, TypeError, ValueError."""
@@ -87,13 +77,13 @@ class FormCurve:
         return cls(str(document["input"]), str(document["unit"]), at, mean, low, high, slope)
 
 
-@dataclass(frozen=True)
+@answer
 class LaneCurves:
     """What an effect adds to one joint in training: its range, and a curve for each input."""
 
     lowest_deg: float
     highest_deg: float
-    curves: tuple[FormCurve, ...]
+    inputs: tuple[FormCurve, ...]
 
     @classmethod
     def over(cls, inputs: Mapping[str, np.ndarray], unit: str, degrees: np.ndarray) -> LaneCurves:
@@ -110,17 +100,13 @@ class LaneCurves:
         """Numbers with units in their names."""
         slopes = {
             f"slope_deg_per_{item.unit or 'unit'}[{item.input}]": item.slope_deg_per_unit
-            for item in self.curves
+            for item in self.inputs
         }
         return {"lowest_added_deg": self.lowest_deg, "highest_added_deg": self.highest_deg, **slopes}
 
     def to_document(self) -> dict[str, Any]:
         """Plain data of a few kB at most."""
-        return {
-            "lowest_deg": self.lowest_deg,
-            "highest_deg": self.highest_deg,
-            "inputs": [item.to_document() for item in self.curves],
-        }
+        return asdict(self)
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> LaneCurves:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.joint_units import on_lanes
+from glovecal_models.effects.base.signals import on_lanes
 from glovecal_models.errors import BadInput
 
 OWN = "own"

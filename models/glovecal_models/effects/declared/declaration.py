@@ -13,6 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
+import numpy as np
+
 from glovecal_models.effects.base.facts import Control, Parameter
 from glovecal_models.errors import BadInput
 from glovecal_models.expression import FUNCTIONS, Node, check_names, parse_expressions
@@ -21,6 +23,8 @@ from glovecal_models.names import check_channel_name, check_identifier, did_you_
 LONGEST_TEXT = 2000
 MOST_PARAMETERS = 2
 MOST_COLUMNS = 8
+MOST_VALUES = {1: 8, 2: 6}
+"""Tried for each parameter, by the number of parameters."""
 RESERVED: tuple[str, ...] = ("own", "own_deg", "t")
 """The joint's signal in its standard deviations and in degrees, and the seconds since the take began."""
 _UNIT = re.compile(r"[A-Za-z0-9/%^_-]{1,20}\Z")
@@ -38,7 +42,7 @@ class Declaration:
     """Of each weight."""
     parameters: tuple[Parameter, ...] = ()
     starts: tuple[float, ...] = ()
-    """A value to be tried for each parameter: what the user believes."""
+    """What the user believes of each parameter: one of the values that are tried."""
     ranges: tuple[tuple[str, float, float], ...] = ()
     """Context column (without ``c.``), lowest and highest value; others keep the range of training."""
     control: Control = "circularly shifted"
@@ -172,9 +176,17 @@ def _parameters(items: Any, source: str) -> tuple[tuple[Parameter, ...], tuple[f
             raise BadInput(f"{source}: parameter {name} needs low < high and a start between, "
                            f"not {low:g}, {high:g} and {start:g}")  # fmt: skip
         unit = _unit(item.get("unit", "1"), source)
-        parameters.append(Parameter(name, unit, low, high, f"about {start:g} {unit}, as declared"))
+        tried = _tried(low, high, start, MOST_VALUES[len(items)])
+        parameters.append(Parameter(name, unit, low, high, f"about {start:g} {unit}, as declared", tried))
         starts.append(start)
     return tuple(parameters), tuple(starts)
+
+
+def _tried(low: float, high: float, start: float, most: int) -> tuple[float, ...]:
+    """Values in a ratio (or, from 0 or below, in even steps), one of them moved to ``start``."""
+    values = np.geomspace(low, high, most) if low > 0 else np.linspace(low, high, most)
+    values[int(np.argmin(np.abs(values - start)))] = start
+    return tuple(values.tolist())
 
 
 def _ranges(items: Any, source: str) -> tuple[tuple[str, float, float], ...]:

@@ -2,20 +2,153 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect, Stream
-from glovecal_models.effects.base.facts import Settings, ShownOver
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S, elapsed_s, unbroken
-from glovecal_models.effects.base.joint_units import fit_joint_units, in_joint_units
-from glovecal_models.effects.base.signals import Signals
+from glovecal_models.effects.base.comparison import EffectComparison
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S, OwnDynamics, elapsed_s, unbroken
+from glovecal_models.effects.base.effect import Stream
+from glovecal_models.effects.base.facts import About, Shape, ShownOver, Weights
+from glovecal_models.effects.base.relaxation import relax
+from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, in_joint_units
 from glovecal_models.effects.declared.declaration import Declaration
-from glovecal_models.effects.declared.expression_value import Evaluation, Memory, Undefined
 from glovecal_models.errors import BadInput
+from glovecal_models.expression import Node
 from glovecal_models.names import did_you_mean
+
+# What an expression is worth in each frame, with the memory of its low passes. Values are arrays that
+# broadcast to (B, L): B frames, L lanes. Where an operation has no finite result the value is NaN from
+# there on, and the first such place is remembered for a message. A low pass holds still over such frames,
+# so that one bad frame does not spoil those after it.
+
+
+@dataclass
+class Memory:
+    """What low passes and previous values remember, by the place of their node; empty at a start."""
+
+    states: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Undefined:
+    """The first operation without a result."""
+
+    frame: int
+    """Counted from the start of the block."""
+    sentence: str
+
+
+class Evaluation:
+    """Values of the nodes of one effect over a block of B frames and L lanes.
+
+    ``names`` holds each name's values, broadcasting to (B, L); ``elapsed_s`` is (B,).
+    """
+
+    def __init__(
+        self, names: Mapping[str, np.ndarray], elapsed_s: np.ndarray, lanes: int, memory: Memory
+    ) -> None:
+        self._names, self._elapsed_s, self._memory = names, elapsed_s, memory
+        self._shape = (len(elapsed_s), lanes)
+        self.undefined: Undefined | None = None
+
+    def value(self, node: Node) -> np.ndarray:
+        """(B, L) of one column; NaN where it has no value."""
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(self._value(node), self._shape)
+
+    def _value(self, node: Node) -> np.ndarray:
+        if node.kind == "number":
+            return np.array([[node.value]])
+        if node.kind == "name":
+            return self._names[node.text]
+        parts = [self._value(part) for part in node.parts]
+        if node.kind == "lowpass":
+            return self._lowpass(node, *parts)
+        if node.kind == "previous":
+            return self._previous(node, parts[0])
+        result = _OPERATIONS[node.kind](*parts)
+        finite = np.isfinite(result)
+        if finite.all():
+            return result
+        new = ~finite
+        for part in parts:
+            new = new & ~np.isnan(part)
+        if new.any():
+            self._remember(node, parts, new)
+        return np.where(finite, result, np.nan)
+
+    def _remember(self, node: Node, parts: list[np.ndarray], new: np.ndarray) -> None:
+        new = np.broadcast_to(new, self._shape)
+        frame, lane = np.unravel_index(int(np.argmax(new)), self._shape)
+        if self.undefined is not None and self.undefined.frame <= frame:
+            return
+        operands = [float(np.broadcast_to(part, self._shape)[frame, lane]) for part in parts]
+        self.undefined = Undefined(int(frame), f"{_problem(node.kind, operands)} in {node.text!r}")
+
+    def _lowpass(self, node: Node, target: np.ndarray, tau_s: np.ndarray) -> np.ndarray:
+        target = np.broadcast_to(target, self._shape)
+        if len(tau_s) != 1 or not (tau_s > 0).all():
+            self._remember(node, [target, tau_s], np.ones(self._shape, dtype=bool))
+            return np.full(self._shape, np.nan)
+        tau = np.broadcast_to(tau_s[0], self._shape[1:])
+        state = self._memory.states.get(node.place)
+        if state is None:
+            state = self._memory.states[node.place] = np.full(self._shape[1], np.nan)
+        known = np.isfinite(target)
+        if known.all():
+            np.copyto(state, target[0], where=np.isnan(state))
+            return relax(state, self._elapsed_s, target, tau)
+        return self._lowpass_with_holes(state, target, known, tau)
+
+    def _lowpass_with_holes(
+        self, state: np.ndarray, target: np.ndarray, known: np.ndarray, tau: np.ndarray
+    ) -> np.ndarray:
+        result = np.full(self._shape, np.nan)
+        for frame in range(len(target)):
+            fresh = known[frame] & np.isnan(state)
+            state[fresh] = target[frame, fresh]
+            aim = np.where(known[frame], target[frame], state)
+            after = relax(state, self._elapsed_s[frame : frame + 1], aim[None], tau)[0]
+            result[frame] = np.where(known[frame], after, np.nan)
+        return result
+
+    def _previous(self, node: Node, values: np.ndarray) -> np.ndarray:
+        values = np.broadcast_to(values, self._shape)
+        first = self._memory.states.get(node.place)
+        if first is None:
+            first = values[0]
+        self._memory.states[node.place] = values[-1].copy()
+        return np.concatenate([first[None], values[:-1]])
+
+
+def _problem(kind: str, operands: list[float]) -> str:
+    if kind == "/":
+        return "division by zero" if operands[1] == 0 else f"{operands[0]:g} / {operands[1]:g} is too large"
+    if kind == "^":
+        wrong = "is too large" if operands[0] > 0 or operands[1] > 0 else "has no value"
+        wrong = "has no real value" if operands[0] < 0 and operands[1] % 1 else wrong
+        return f"{operands[0]:g} ^ {operands[1]:g} {wrong}"
+    if kind == "lowpass":
+        return f"low pass with a time constant of {operands[1]:g} s that is not positive and fixed"
+    if kind in ("log", "sqrt"):
+        return f"{kind} of {operands[0]:g}"
+    return f"{kind} of {', '.join(f'{value:g}' for value in operands)} is too large"
+
+
+def _power(base: np.ndarray, exponent: np.ndarray) -> np.ndarray:
+    return np.power(base.astype(float), exponent)
+
+
+_OPERATIONS: dict[str, Callable[..., np.ndarray]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "^": _power, "minus": np.negative,
+    "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs, "tanh": np.tanh, "sin": np.sin,
+    "cos": np.cos, "min": np.minimum, "max": np.maximum,
+    "clip": lambda x, low, high: np.minimum(np.maximum(x, low), high),
+}  # fmt: skip
+
 
 LARGEST = 1e9
 """Of a column: squares of more lose the digits of everything fitted beside it."""
@@ -25,37 +158,31 @@ TOO_LARGE = (
 )
 SAME = 1e-9
 """Share of a column's size within which it does not change."""
-MOST_VALUES = {1: 8, 2: 6}
-"""Values tried for each parameter, by the number of parameters."""
 
 
-class ExpressionEffect(Effect):
+class ExpressionEffect(OwnDynamics):
     """Columns as declared; the declared parameters are the shape.
 
     A context column is held inside its declared range, or else the range of training; an unknown value counts
-    as the usual one. A frame in which a column has no value (a division by zero, say) gets zero columns; see
-    ``undefined_frames`` and the stream's ``undefined``. In training it is refused.
+    as the usual one. A frame in which a column has no value (a division by zero, say) gets zero columns; the
+    stream says why. In training it is refused.
     """
-
-    source: ClassVar[str] = "declared by the user"
 
     def __init__(self, declaration: Declaration) -> None:
         self.declaration = declaration
         self._signals = declaration.signals
         self._reads_own = any("own" in node.names for node in declaration.columns)
         self._reads_time = any("t" in node.names for node in declaration.columns)
-        shown = declaration.explanation or f"Declared by the user: {declaration.columns_text}."
-        # Every other effect has these as attributes of its class; here each object has its own.
-        vars(self).update(
-            name=declaration.name,
-            explanation=shown,
-            parameters=declaration.parameters,
-            context=declaration.context,
-            neighbours=declaration.signals,
+        self.name, self.context = declaration.name, declaration.context
+        self.about = About(
+            declaration.explanation or f"Declared by the user: {declaration.columns_text}.",
+            source="declared by the user",
             shown_over=_shown_over(declaration),
-            control=declaration.control,
-            has_memory=any(node.has_memory for node in declaration.columns),
+            neighbours=declaration.signals,
         )
+        self.shape = Shape(declaration.parameters)
+        self.has_memory = any(node.has_memory for node in declaration.columns)
+        self.comparison = EffectComparison(declaration.control, needs_movement=self.has_memory)
 
     @property
     def needs_time(self) -> bool:
@@ -96,7 +223,7 @@ class ExpressionEffect(Effect):
         """The first column that never changes, whatever its parameters: the calibration has a constant."""
         settings, moves = self.fit_constants(takes), np.zeros(len(self.declaration.columns), dtype=bool)
         low = high = np.zeros(len(moves))
-        for shape in self.grid(takes, settings):
+        for shape in self.shape.grid(takes, settings):
             values = [self._evaluated(take, settings, shape)[0] for take in takes if len(take)]
             low = np.min([part.min(axis=(0, 1)) for part in values], axis=0)
             high = np.max([part.max(axis=(0, 1)) for part in values], axis=0)
@@ -132,34 +259,18 @@ class ExpressionEffect(Effect):
         }
         return settings | {"scale": self._scale(takes, settings)}
 
-    def prior_sd(self, settings: Settings) -> np.ndarray:
-        """A degree for a column of its usual size, whatever the unit it is written in."""
-        scale = np.array(settings.get("scale", [1.0] * len(self.declaration.columns)))
-        return 1.0 / np.where(scale > 0, scale, 1.0)
-
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        axes = [
-            _values(item.low, item.high, start, MOST_VALUES[len(self.parameters)])
-            for item, start in zip(self.parameters, self.declaration.starts, strict=True)
-        ]
-        pairs = (
-            np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1).T if axes else np.zeros((1, 0))
-        )
-        return np.repeat(pairs[:, None, :], takes[0].own.shape[1], axis=1)
-
     def columns(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         values = self._evaluated(take, settings, shape)[0]
         return np.where(np.isfinite(values).all(axis=2, keepdims=True), values, 0.0)
 
-    def undefined_frames(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
-        """(N,) True for frames in which some column of some lane has no value."""
-        return np.isnan(self._evaluated(take, settings, shape)[0]).any(axis=(1, 2)).astype(bool)
-
     def stream(self, settings: Settings, shape: np.ndarray) -> ExpressionStream:
         return ExpressionStream(self, settings, shape)
 
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"weight_{self.declaration.unit}[{node.text}]" for node in self.declaration.columns)
+    def weights(self, settings: Settings) -> Weights:
+        """A degree for a column of its usual size, whatever the unit it is written in."""
+        names = tuple(f"weight_{self.declaration.unit}[{node.text}]" for node in self.declaration.columns)
+        scale = np.array(settings.get("scale", [1.0] * len(names)))
+        return Weights(names, 1.0 / np.where(scale > 0, scale, 1.0))
 
     def block(
         self, take: Signals, settings: Settings, shape: np.ndarray, start_s: float, elapsed: np.ndarray,
@@ -181,7 +292,7 @@ class ExpressionEffect(Effect):
         names: dict[str, np.ndarray] = {"own_deg": take.own, "t": (take.time_s - start_s)[:, None]}
         if self._reads_own:
             names["own"] = in_joint_units(take.own, settings)
-        for column, item in enumerate(self.parameters):
+        for column, item in enumerate(self.shape.parameters):
             names[item.name] = shape[None, :, column]
         for name in self._signals:
             names[name] = take.others.get(name, rest)[:, None]
@@ -213,7 +324,7 @@ class ExpressionEffect(Effect):
     def _scale(self, takes: Sequence[Signals], settings: Settings) -> list[float]:
         """The usual size (RMS) of each column over all shapes. Raises BadInput for what cannot be fitted."""
         squares, count = np.zeros(len(self.declaration.columns)), 0
-        for shape in self.grid(takes, settings):
+        for shape in self.shape.grid(takes, settings):
             for take in takes:
                 values, undefined = self._evaluated(take, settings, shape)
                 if undefined is not None:
@@ -277,13 +388,6 @@ class ExpressionStream(Stream):
 def _place(take: Signals, frame: int) -> str:
     named = f" of take {take.take}" if take.take else ""
     return f"frame {frame}{named} ({take.time_s[frame] - take.time_s[0]:.3f} s from its start)"
-
-
-def _values(low: float, high: float, start: float, most: int) -> np.ndarray:
-    """Values in a ratio (or, from 0 or below, in even steps), one of them moved to ``start``."""
-    values = np.geomspace(low, high, most) if low > 0 else np.linspace(low, high, most)
-    values[int(np.argmin(np.abs(values - start)))] = start
-    return values
 
 
 def _piece(take: Signals, part: slice) -> Signals:

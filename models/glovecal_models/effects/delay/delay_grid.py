@@ -20,7 +20,7 @@ from glovecal_models.effects.base.assessment import (
     block_starts,
     squared_in_blocks,
 )
-from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
 

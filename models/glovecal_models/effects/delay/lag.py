@@ -7,25 +7,21 @@ find how much smoothing the noise wants: one left 1.3 times the error of a glove
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.facts import Parameter, Rival, Settings
-from glovecal_models.effects.base.history_effect import ArrayStateEffect
-from glovecal_models.effects.base.motions import FAST
-from glovecal_models.effects.base.problem import Problem
+from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.base.dynamics import ArrayStateEffect
+from glovecal_models.effects.base.facts import About, Parameter, Shape, Weights
+from glovecal_models.effects.base.relations import FAST
 from glovecal_models.effects.base.relaxation import relax, relax_once
-from glovecal_models.effects.base.signals import Signals
-from glovecal_models.effects.delay.delay_grid import (
-    DelayErrors,
-    delay_errors,
-    held_out_beside,
-    why_no_delay_shows,
-)
-from glovecal_models.effects.delay.delay_verdict import CLOCK, LATENCY, first_delay
+from glovecal_models.effects.base.signals import Settings, Signals
+from glovecal_models.effects.delay.delay_comparison import DelayComparison
+from glovecal_models.effects.delay.delay_grid import DelayErrors, delay_errors, held_out_beside
+from glovecal_models.effects.delay.delay_verdict import LAG
 
 MULTIPLES = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
 TAU_S = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15)
@@ -33,24 +29,9 @@ PRIOR = 8.0
 """Of the weights: with a time constant below the lag's own they are its ratio, and of either sign."""
 
 
-class Lag(ArrayStateEffect):
-    name = "lag"
-    explanation = "The sensor follows the joint late: fast movements come out smaller and delayed."
-    source = "first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)"
-    parameters: ClassVar = (Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms"),)
-    alike: ClassVar = (CLOCK, LATENCY)
-    shown_by: ClassVar = FAST
-    shows_in: ClassVar = ("speed", "direction")
-    shown_over: ClassVar = "speed"
-    rivals: ClassVar = (
-        Rival(CLOCK, FAST),
-        Rival(LATENCY, FAST),
-        Rival("hysteresis", FAST),
-        Rival("creep", FAST),
-    )
-
-    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
-        return why_no_delay_shows(takes)
+@dataclass(frozen=True)
+class LagComparison(DelayComparison):
+    """Each joint has its own; the control leads by as much."""
 
     def assess(self, problem: Problem) -> Assessment:
         grids = delay_errors(problem)
@@ -64,14 +45,24 @@ class Lag(ArrayStateEffect):
         taus = tuple(np.array([grid.delay_s[cell]]) for grid, cell in zip(grids, lags, strict=True))
         nothing = tuple(np.empty(0) for _ in grids)
         return Assessment(
-            self.name, problem.rotations, errors, taus, nothing, None, ("tau_s",), limits=problem.limits
+            LAG, problem.rotations, errors, taus, nothing, None, ("tau_s",), limits=problem.limits
         )
 
-    def told_from_alikes(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
-        return first_delay(problem)
 
-    def grid(self, takes: Sequence[Signals], settings: Settings) -> np.ndarray:
-        return np.repeat(np.array(TAU_S)[:, None, None], takes[0].own.shape[1], axis=1)
+class Lag(ArrayStateEffect):
+    name = LAG
+    about = About(
+        "The sensor follows the joint late: fast movements come out smaller and delayed.",
+        source="first-order low pass, 5 to 150 ms (facts: rate-dependent flex sensors)",
+        shown_over="speed",
+        shows_in=("speed", "direction"),
+        shown_by=FAST,
+    )
+    shape = Shape((Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms", tried=TAU_S),))
+    comparison = LagComparison()
+
+    def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
+        return self.comparison.not_applicable_reason(takes)
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         return np.repeat(own[:, None], len(MULTIPLES), axis=1)
@@ -93,15 +84,12 @@ class Lag(ArrayStateEffect):
         relaxed = relax(state, elapsed_s, own[..., None], shape * MULTIPLES)
         return own[..., None] - relaxed
 
-    def prior_sd(self, settings: Settings) -> np.ndarray:
-        return np.full(len(MULTIPLES), PRIOR)
+    def weights(self, settings: Settings) -> Weights:
+        return Weights(tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES), PRIOR)
 
-    def forward_weights(self, settings: Settings, generator: np.random.Generator) -> np.ndarray:
+    def drawn_weights(self, prior_sd: np.ndarray, generator: np.random.Generator) -> np.ndarray:
         """The low pass of tau alone."""
         return np.where(MULTIPLES == 1.0, -1.0, 0.0)
-
-    def weight_names(self, settings: Settings) -> tuple[str, ...]:
-        return tuple(f"lead_{multiple:g}_tau_deg_per_deg" for multiple in MULTIPLES)
 
 
 def _best(grid: DelayErrors, cells: np.ndarray) -> int:

@@ -17,15 +17,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.effect import Effect
-from glovecal_models.effects.base.facts import Rival, Settings, Stage
-from glovecal_models.effects.base.interval_effect import ClaimedErrors, Interval, IntervalEffect
-from glovecal_models.effects.base.motions import CROSSED
-from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
+from glovecal_models.effects.base.effect import CorrectionEffect, Hidden, IntervalEffect
+from glovecal_models.effects.base.facts import About, DriftInHolds
+from glovecal_models.effects.base.findings import (
+    ClaimedErrors,
+    Finding,
+    Interval,
+    Proposal,
+    Recorded,
+    check_signature_input,
+)
+from glovecal_models.effects.base.relations import CROSSED
+from glovecal_models.effects.base.signals import Settings
+from glovecal_models.effects.between import TABLE
 from glovecal_models.effects.garment_slip.slip_components import (
     BETWEEN,
     INSIDE,
@@ -36,9 +43,9 @@ from glovecal_models.effects.garment_slip.slip_components import (
     slip_components,
 )
 from glovecal_models.effects.garment_slip.slip_rate import frame_noise, slip_rate, without_posture
-from glovecal_models.effects.garment_slip.take_means import is_common
 from glovecal_models.takes.take import Take
 
+PARTS = TABLE.whole("garment_slip").parts
 GROWS_S = 1800.0
 """A cloth does not walk away for ever: from then on the variance stays."""
 OVER_NOISE = 0.5
@@ -48,7 +55,7 @@ NEEDED_LIKELIER = 4.0
 CAUSE_LIKELIER = 6.0
 """Twice the log likelihood ratio, summed over rotations, from which on a recorded cause is needed beside a
 slip: 95 % of chi squared with two degrees of freedom. Of 48 simulated gloves with such a cause that saves
-less than ``also_explained_share`` 32 have more; of 9 that slip 8 have less (2026-11-24)."""
+less than the share of a slip's parts 32 have more; of 9 that slip 8 have less (2026-11-24)."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,8 @@ class SlipGrowth:
 class SlipInterval(Interval):
     """Of L rotations."""
 
+    needs_time = True
+
     def __init__(self, growths: Sequence[SlipGrowth]) -> None:
         self._a_minute = np.array([item.rate_deg_per_sqrt_min**2 for item in growths])
 
@@ -80,27 +89,20 @@ def slip_growth(held_out: Sequence[ClaimedErrors]) -> SlipGrowth:
     return SlipGrowth(slip_rate(times, errors, angles) or 0.0)
 
 
-class GarmentSlip(IntervalEffect):
+class GarmentSlip(IntervalEffect, Hidden):
     name = "garment_slip"
-    plain_name = "the glove slipping"
-    stage: ClassVar[Stage] = "last"  # creep looks like a slip
-    shows_later: ClassVar[bool] = True
-    learns_unfound: ClassVar[bool] = True
-    shown_over: ClassVar = "take"
-    # A walk over minutes differs between wearings, goes along with one slow column or other by chance, and a
-    # cuff that works down looks like a strip that creeps.
-    also_explained_by: ClassVar = (
-        "donning_shift", "temperature", "humidity", "warmup_drift", "supply_sag", "creep",
-    )  # fmt: skip
-    also_explained_share: ClassVar = 0.55  # a true cause of those saves more at 1.3 noise floors, a walk less
-    drift_in_holds: ClassVar = "goes on"
-    shown_by: ClassVar = CROSSED
-    rivals: ClassVar = tuple(
-        Rival(name, CROSSED)
-        for name in ("warmup_drift", "temperature", "humidity", "supply_sag", "donning_shift")
+    about = About(
+        "The glove slips on the hand while it is worn: the error wanders and does not come back.",
+        source="random walk of the offset, deg/sqrt(min); a known pose resets it",
+        shown_over="take",
+        shown_by=CROSSED,
+        in_holds=DriftInHolds("goes on", "the glove slipping"),
     )
-    explanation = "The glove slips on the hand while it is worn: the error wanders and does not come back."
-    source = "random walk of the offset, deg/sqrt(min); a known pose resets it"
+
+    @property
+    def hidden(self) -> Hidden:
+        """Creep looks like a slip."""
+        return self
 
     def find(
         self,
@@ -128,11 +130,15 @@ class GarmentSlip(IntervalEffect):
         return tuple(sorted((finding for finding, _ in found), key=lambda item: -(item.size_deg or 0.0)))
 
     def may_be_instead(
-        self, first: Effect, takes: Sequence[Take], sensor_of: Mapping[str, str], errors: Sequence[np.ndarray]
+        self,
+        first: CorrectionEffect,
+        takes: Sequence[Take],
+        sensor_of: Mapping[str, str],
+        errors: Sequence[np.ndarray],
     ) -> bool:
         """A walk goes along with one slow column or other by chance: whether a slip, which may be too small
         to be found, makes these takes as likely as the cause does."""
-        if first.name not in self.also_explained_by or not first.changes_between_takes:
+        if first.name not in PARTS or not first.comparison.changes_between_takes:
             return False
         likelier = 0.0
         for column, rotation in enumerate(sensor_of):
@@ -145,10 +151,6 @@ class GarmentSlip(IntervalEffect):
         found = self.find(recorded.takes, recorded.sensor_of, recorded.static_errors())
         where = tuple(dict.fromkeys(name for item in found for name in item.where))
         return Proposal({}, where, tuple(item.sentence for item in found)) if found else None
-
-    @property
-    def needs_time(self) -> bool:
-        return True
 
     def learned(self, held_out: Sequence[ClaimedErrors], found: Settings) -> Settings:
         rotations = dict.fromkeys(item.rotation for item in held_out)
@@ -203,5 +205,29 @@ def _finding(rotation: str, slip: SlipComponents, rate_deg_per_sqrt_min: float |
         GarmentSlip.name, (rotation,), sentence, kind=slip.kind, size_deg=slip.size_deg, count=slip.pieces,
         evidence=evidence,
         accounts_for=("donning_shift",) if slip.wearings_likelier < NEEDED_LIKELIER else (),
-        rivals=GarmentSlip.also_explained_by,
+        rivals=PARTS,
     )  # fmt: skip
+
+
+# Whether the takes of several joints differ together: sensors slip each by itself.
+
+
+COMMON_JOINTS, COMMON_SHARE = 3, 0.8
+"""What moves so many together to this share has a cause outside them."""
+FEWEST_COMMON_TAKES = 4
+
+
+def is_common(takes: Sequence[Take], errors: Sequence[Sequence[np.ndarray]]) -> bool:
+    """``errors`` (N,) for each joint and take, degrees: their means, less those of the wearings."""
+    if len(errors) < COMMON_JOINTS:
+        return False
+    known = [number for number in range(len(takes)) if all(np.isfinite(e[number]).any() for e in errors)]
+    if len(known) < FEWEST_COMMON_TAKES:
+        return False
+    means = np.array([[np.nanmean(joint[number]) for joint in errors] for number in known])
+    wearings = np.array([takes[number].wearing for number in known])
+    for wearing in np.unique(wearings):
+        means[wearings == wearing] -= means[wearings == wearing].mean(axis=0)
+    means /= np.maximum(np.linalg.norm(means, axis=0), 1e-12)
+    together = np.linalg.svd(means, compute_uv=False) ** 2
+    return bool(together[0] > COMMON_SHARE * together.sum())

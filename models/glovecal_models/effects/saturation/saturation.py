@@ -7,16 +7,24 @@ angle is known on one side only. The interval there has to cover what the refere
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Rival, Settings
-from glovecal_models.effects.base.interval_effect import ClaimedErrors, IntervalEffect
-from glovecal_models.effects.base.motions import RAMPS
-from glovecal_models.effects.base.signature_effect import Finding, Proposal, Recorded, check_signature_input
-from glovecal_models.effects.saturation.band_search import saturated_bands
-from glovecal_models.effects.saturation.saturated_band import SaturatedBand, SaturationInterval
+from glovecal_models.effects.base.effect import IntervalEffect
+from glovecal_models.effects.base.facts import About
+from glovecal_models.effects.base.findings import (
+    ClaimedErrors,
+    Finding,
+    Proposal,
+    Recorded,
+    check_signature_input,
+)
+from glovecal_models.effects.base.signals import Settings
+from glovecal_models.effects.saturation.saturated_band import (
+    SaturatedBand,
+    SaturationInterval,
+    saturated_bands,
+)
 from glovecal_models.takes.take import Take
 
 LEAST_NOISE_SHARE, MOST_NOISE_SHARE = 0.05, 2.0
@@ -24,13 +32,10 @@ LEAST_NOISE_SHARE, MOST_NOISE_SHARE = 0.05, 2.0
 
 class Saturation(IntervalEffect):
     name = "saturation"
-    explanation = (
-        "The sensor stops responding near the end of its range, or in a part of it: bending is not seen."
+    about = About(
+        "The sensor stops responding near the end of its range, or in a part of it: bending is not seen.",
+        source="clipped converter or fully stretched sensor; bands: study of missing effects",
     )
-    source = "clipped converter or fully stretched sensor; bands: study of missing effects"
-    rivals: ClassVar = (Rival("nonlinearity", RAMPS),)
-    also_explained_by: ClassVar = ("cross_coupling", "hysteresis", "lag")
-    also_explained_share: ClassVar = 0.35  # two simulated gloves that saturate had 0.11 and 0.13
 
     def find(
         self,

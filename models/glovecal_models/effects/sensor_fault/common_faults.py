@@ -9,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 
-from glovecal_models.effects.base.signature_effect import Finding
+from glovecal_models.effects.base.findings import Finding
 
 FEWEST_TOGETHER = 3
 TOGETHER_S = {"jump": 0.5, "dropouts": 0.05, "spikes": 0.05}

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Settings
-from glovecal_models.effects.base.history_effect import LONGEST_GAP_S
-from glovecal_models.effects.base.signature_effect import Held, Hold
+from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
+from glovecal_models.effects.base.findings import Held, Hold
+from glovecal_models.effects.base.signals import Settings
 
 LEVEL_GAIN, SLOPE_GAIN = 0.6, 0.3
 LONGEST_AHEAD_S = 0.1

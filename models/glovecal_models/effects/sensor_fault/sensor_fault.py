@@ -12,29 +12,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
-from glovecal_models.effects.base.facts import Kind, Rival, Settings
-from glovecal_models.effects.base.motions import SHUFFLED
-from glovecal_models.effects.base.signature_effect import (
+from glovecal_models.effects.base.effect import LiveRepair, RepairEffect
+from glovecal_models.effects.base.facts import About
+from glovecal_models.effects.base.findings import (
     Finding,
     Hold,
     LiveCheck,
-    SignatureEffect,
     Stretch,
     check_signature_input,
     frames_inside,
     named,
     stretches_of,
 )
+from glovecal_models.effects.base.signals import Settings
+from glovecal_models.effects.between import TABLE
 from glovecal_models.effects.sensor_fault.common_faults import without_common_faults
 from glovecal_models.effects.sensor_fault.fault_watch import FaultHold
-from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change
-from glovecal_models.effects.sensor_fault.gain_jump import gain_jump
-from glovecal_models.effects.sensor_fault.hum import Hum, hums
-from glovecal_models.effects.sensor_fault.level_switches import LevelSwitches, level_switches
+from glovecal_models.effects.sensor_fault.gain_change import GainChange, gain_change, gain_jump
+from glovecal_models.effects.sensor_fault.level_switches import Hum, LevelSwitches, hums, level_switches
 from glovecal_models.effects.sensor_fault.live_check import live_check
 from glovecal_models.effects.sensor_fault.reading_errors import ReadingErrors, reading_errors
 from glovecal_models.effects.sensor_fault.short_faults import (
@@ -49,6 +47,7 @@ from glovecal_models.progress import Cancel
 from glovecal_models.takes.reading_faults import GRADUAL_SHARE, dropouts, spikes, stuck
 from glovecal_models.takes.take import Take
 
+KINDS: tuple[str, ...] = ("stuck", "spikes", "dropouts", "jump", "changed", "switching", "hum")
 REFERENCE_MOVES_DEG = 10.0
 """The reference must travel so far while a sensor stands still."""
 LEAST_SPIKES = 3
@@ -56,23 +55,22 @@ EXPLAINED_BY = {"switching": ("spikes", "dropouts", "jump"), "hum": ("spikes",)}
 TIMES_PER_FAULT = 4
 """A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
 those that are no larger are explained by them."""
-STICKS = ("hysteresis",)
-"""What sticks and lets go jumps too, and where it jumps goes along with the joint's turns."""
+STICKS = tuple(other for found, other in TABLE.taken_for if found == "sensor_fault")
 LARGEST = {"switching": 2.0, "hum": 3.0}
 """Times the mean height of the switches, or the tone's RMS, that a fault so explained reaches at most."""
 
 
-class SensorFault(SignatureEffect):
+class SensorFault(RepairEffect, LiveRepair):
     name = "sensor_fault"
-    kind: ClassVar[Kind] = "repair"
-    shown_over: ClassVar = "time in take"
-    alike_between_levels: ClassVar = ("nonlinearity",)
-    rivals: ClassVar = (Rival("nonlinearity", SHUFFLED),)
-    explanation = "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, switches or hums."
-    source = "signatures of readings against reference"
-    kinds: ClassVar[tuple[str, ...]] = (
-        "stuck", "spikes", "dropouts", "jump", "changed", "switching", "hum",
-    )  # fmt: skip
+    about = About(
+        "A wire or plug fails: the sensor stands still, spikes, drops out, jumps, switches or hums.",
+        source="signatures of readings against reference",
+        shown_over="time in take",
+    )
+
+    @property
+    def live(self) -> LiveRepair:
+        return self
 
     def find(
         self,
@@ -91,7 +89,7 @@ class SensorFault(SignatureEffect):
         found = _with_unsteady(takes, without_common_faults(found, len(rotation_of)), rotation_of)
         return tuple(sorted(found, key=lambda item: (-len(item.stretches), item.where)))
 
-    def find_between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
+    def between_levels(self, takes: Sequence[Take], sensor_of: Mapping[str, str]) -> tuple[Finding, ...]:
         """Jumps, each with the known angles it lies between, and what it cannot be told from."""
         jumps = [item for item in self.find(takes, sensor_of) if item.kind == "jump"]
         return tuple(_between_levels(item, takes, sensor_of) for item in jumps)
@@ -109,10 +107,6 @@ class SensorFault(SignatureEffect):
     def hold(self, settings: Settings, rotations: Sequence[str], sensors: Sequence[str]) -> Hold | None:
         """For a model that knows what its sensors do when they are sound."""
         return FaultHold(settings["live"], rotations, sensors) if "live" in settings else None
-
-    @property
-    def needs_time(self) -> bool:
-        return True
 
     def repaired(self, takes: Sequence[Take], settings: Settings | None = None) -> tuple[Take, ...]:
         """The takes without reference where the joint's own sensor failed: it neither trains nor scores."""
@@ -133,8 +127,8 @@ def _faults(
     angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
     asked = np.split(as_large_as_readings(np.concatenate(angles), low, high), _ends(columns))
     short = _short_faults(takes, changes, sensor, angles, asked, low, high)
-    stretches: dict[str, list[Stretch]] = {kind: [] for kind in SensorFault.kinds}
-    frames = dict.fromkeys(SensorFault.kinds, 0)
+    stretches: dict[str, list[Stretch]] = {kind: [] for kind in KINDS}
+    frames = dict.fromkeys(KINDS, 0)
     jumps, sound_angles = [], []
     for take, readings, angle, shown, brief in zip(takes, columns, angles, asked, short, strict=True):
         time_s, span = take.time_s, high - low

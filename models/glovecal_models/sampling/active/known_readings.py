@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.layout import Correspondence
-from glovecal_models.quick_check.pose_book import REPEAT_SD_DEG
+from glovecal_models.quick_check.held_poses import REPEAT_SD_DEG
 from glovecal_models.sampling.protocol import Step
 from glovecal_models.sampling.state import SamplingState
 from glovecal_models.takes.take import Take

@@ -9,7 +9,7 @@ for stands beside them: such takes separate causes, which no variance of a proce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,23 +17,23 @@ import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.samples import require_layout
-from glovecal_models.covariance.squared_exponential import SquaredExponentialArd
+from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.layout import Layout
-from glovecal_models.regression.process_regressor import ProcessRegressor
+from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.sampling.active.known_readings import known_from_state, known_from_takes
 from glovecal_models.sampling.active.proposal import Proposal, ProposedStep, gain_sentence, propose
 from glovecal_models.sampling.catalogue import Equipment, steps_for_layout
 from glovecal_models.sampling.limits import SAMPLING_LIMITS, SamplingLimits
-from glovecal_models.sampling.protocol import Step
-from glovecal_models.sampling.state import NextSteps, SamplingState
-from glovecal_models.sampling.steps import (
+from glovecal_models.sampling.protocol import (
     HOLD_S,
     WIDGET_DEG,
+    Step,
     key_pose_steps,
     verification_steps,
     widget_steps,
 )
+from glovecal_models.sampling.state import NextSteps, SamplingState
 from glovecal_models.takes.take import Take
 
 CANDIDATE_MOVE_S = 2.0
@@ -222,19 +222,3 @@ def _sentences(found: Proposal, takes: Sequence[Take]) -> list[str]:
 
 def _has_free_motion(take: Take) -> bool:
     return not take.rotations or bool(np.isnan(take.reference_at_frames(take.rotations)).all(axis=1).any())
-
-
-def diagnosed_take(diagnosis: Mapping[str, Any]) -> dict[str, Any] | None:
-    """What to record by a diagnosis' document, and why in a sentence; None when it asks for nothing."""
-    wanted = diagnosis.get("next_take")
-    if not wanted:
-        return None
-    causes = [name.replace("_", " ") for name in wanted["separates"]]
-    others, last = causes[:-1], causes[-1]
-    rivals = f"{', '.join(others)} {'and' if others else ''} {last}".strip()
-    return {
-        "what": wanted["what"],
-        "seconds": wanted["seconds"],
-        "separates": list(wanted["separates"]),
-        "reason": f"The diagnosis cannot tell {rivals} apart with the takes there are; this one would.",
-    }

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.inverse_kinematics.contact import Rod, Touch
-from glovecal_models.inverse_kinematics.steadied import steadied
 from glovecal_models.layout import Layout
-from glovecal_models.quick_check.pose_book import REPEAT_SD_DEG
+from glovecal_models.quick_check.held_poses import REPEAT_SD_DEG
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, Touch
+from glovecal_models.sampling.inverse_kinematics.follow import steadied
 from glovecal_models.sampling.protocol import Kind
 from glovecal_models.sampling.sampled_takes import SampledTake
 from glovecal_models.takes.take import Take

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import cho_solve, cholesky
 
-from glovecal_models.hand.rotations import HAND_ROTATIONS, REST_DEG, RULES
-from glovecal_models.hand_ranges import ACTIVE_RANGE_DEG
-from glovecal_models.inverse_kinematics.hand_shape import FINGER_SD_DEG, THUMB_SD_DEG
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HAND_ROTATIONS, REST_DEG, RULES
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.labelled_takes import LabelledFrames, hold_sd_deg
+from glovecal_models.sampling.inverse_kinematics.follow import FINGER_SD_DEG, THUMB_SD_DEG
 from glovecal_models.typical_counts import TYPICAL_COUNTS
 
 Shape = Callable[[np.ndarray, np.ndarray], np.ndarray]

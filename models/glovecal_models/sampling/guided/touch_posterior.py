@@ -1,6 +1,6 @@
 """What all touches of a session tell together about the calibration of every joint that moves the tips.
 
-Inverse kinematics of single frames (``ik_samples.py``) cannot know whether a finger or the thumb was read
+Inverse kinematics of single frames cannot know whether a finger or the thumb was read
 wrong, so it divides the gap between them, and repeating it with a better calibration converges slowly. But a
 calibration errs in the same way in every frame: priors say how its errors go together, the touches of all
 frames and fingers are conditions on them, and one Gauss-Newton search (an iterated Kalman update) finds the
@@ -18,10 +18,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from glovecal_models.errors import Cancelled
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.inverse_kinematics.contact import Rod, Touch
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
 from glovecal_models.progress import Cancel
 from glovecal_models.sampling.guided.rotation_posterior import RotationPosterior
+from glovecal_models.sampling.inverse_kinematics.contact import Rod, TipChains, Touch
 
 CONTACT_SD_MM = 0.3
 """How far tips that touch are from one point."""

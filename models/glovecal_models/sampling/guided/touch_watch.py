@@ -8,16 +8,15 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.inverse_kinematics.tip_chains import TipChains
-from glovecal_models.inverse_kinematics.touch_check import require_possible
 from glovecal_models.layout import Layout
 from glovecal_models.sampling.guided.labelled_takes import FK, LabelledTake, contact_of, labelled_takes
 from glovecal_models.sampling.guided.rotation_posterior import first_posteriors
 from glovecal_models.sampling.guided.seen_touches import seen_touches
 from glovecal_models.sampling.guided.touch_posterior import TouchPosterior
+from glovecal_models.sampling.inverse_kinematics.contact import TipChains
+from glovecal_models.sampling.inverse_kinematics.touch_check import require_possible
 from glovecal_models.sampling.protocol import Protocol, Step
-from glovecal_models.sampling.reading import GloveReading
-from glovecal_models.sampling.state import SamplingState
+from glovecal_models.sampling.state import GloveReading, SamplingState
 from glovecal_models.takes.take import Take
 
 

@@ -3,6 +3,12 @@
 The equations are found first (``initialisation.py``); the takes that are trained on have the angles which
 these give to their frames. Least squares of the training then find the very same scales and offsets, and the
 model is stored, served and compared like any other. What it claims to err by is what the shapes left open.
+
+Takes of named hand shapes with the angles that the names tell, for the glove maker's calibration.
+
+A flat hand has the angles of a usual flat hand; where fingertips touch, thumb and finger have those of the
+likeliest resting hand that keeps the touch. Fingers that the touch does not need may be anywhere: their
+rotations stay without a second angle.
 """
 
 from __future__ import annotations
@@ -20,12 +26,23 @@ from glovecal_models.hand.rotations import PALM
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
 from glovecal_models.layout import Layout
 from glovecal_models.regression.linear_regressor import LinearRegressor
-from glovecal_models.sampling.guided.labelled_takes import LabelledTake
+from glovecal_models.sampling.guided.labelled_takes import LabelledTake, contact_of
+from glovecal_models.sampling.protocol import usual_angles
+from glovecal_models.sampling.shown_hands import (
+    KnownAngle,
+    Observation,
+    merged,
+    observations,
+    shape_angles,
+    touching_angles,
+)
 from glovecal_models.sampling.template.initialisation import Initialisation, initialised
-from glovecal_models.sampling.template.observations import Observation, observations
+from glovecal_models.takes.still_hand import stillest
 from glovecal_models.takes.take import Take
 
 HOW = "not estimated: hand shapes whose angles nobody measured"
+POSES = {"flat": "flat", "spread": "spread", "fist": "fist", "o-index": "touch-I", "o-pinky": "touch-P"}
+"""Of the shapes of a session, whose takes have their names."""
 
 
 @dataclass(frozen=True)
@@ -133,3 +150,44 @@ def _with_angles(labelled: LabelledTake, found: Initialisation) -> Take:
 
 def _columns(angles: Iterable[np.ndarray]) -> np.ndarray:
     return np.column_stack(list(angles))
+
+
+def shape_take(take: Take, shape: str) -> LabelledTake:
+    """The stillest second of a take in which one of the session's shapes was held, as a sampling has it."""
+    pose, rows = POSES[shape], stillest(take)
+    names = ["" for _ in take.time_s]
+    names[rows] = [pose] * len(names[rows])
+    shown = replace(take, poses=tuple(names))
+    if pose.startswith("touch-"):
+        return LabelledTake(shown, "ik", {pose: contact_of(("T", pose[-1]), None)})
+    angles = usual_angles()[pose]
+    reference = np.full((len(take.time_s), len(angles)), np.nan)
+    reference[rows] = list(angles.values())
+    known = replace(shown, rotations=tuple(angles), reference_time_s=take.time_s, reference=reference)
+    return LabelledTake(known, "fk_independent")
+
+
+def named_takes(takes: Sequence[LabelledTake], skeleton: Skeleton | None) -> list[Take]:
+    """Those with a named shape; without a ``skeleton`` touches are those of an assumed hand."""
+    hand = hand_skeleton() if skeleton is None else skeleton
+    return [found for labelled in takes if (found := _named(labelled, hand)) is not None]
+
+
+def _named(labelled: LabelledTake, hand: Skeleton) -> Take | None:
+    take, known = labelled.take, {}
+    for pose in dict.fromkeys(take.poses or ()):
+        contact = labelled.contacts.get(pose)
+        told = shape_angles(pose) if contact is None else touching_angles(hand, contact)
+        if told:
+            known[pose] = merged(told)
+    names = tuple(dict.fromkeys(name for told in known.values() for name in told))
+    if not names:
+        return None
+    reference = np.full((len(take.time_s), len(names)), np.nan)
+    for pose, told in known.items():
+        reference[labelled.frames(pose)] = _row(names, told)
+    return replace(take, rotations=names, reference_time_s=take.time_s, reference=reference)
+
+
+def _row(names: Sequence[str], told: dict[str, KnownAngle]) -> list[float]:
+    return [told[name].degrees if name in told else np.nan for name in names]

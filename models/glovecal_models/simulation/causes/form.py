@@ -122,7 +122,7 @@ class Cause:
     form: str | None = None
     """The generator's name; None draws one of those that are not set aside from the session's seed."""
     strength_deg: float = 2.0
-    """RMS over affected sensors of what a static map of the own angle cannot explain (``hidden.py``)."""
+    """RMS over affected sensors of what a static map of the own angle cannot explain (``session.py``)."""
     channels: tuple[str, ...] | None = None
     """Sensors concerned; None for all that make sense, drawn where a cause usually sits in one or two.
     Causes of the whole glove (clock, transport, supply) always concern all."""

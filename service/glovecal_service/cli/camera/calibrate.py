@@ -1,4 +1,8 @@
-"""``glovecal camera calibrate``: a camera's lens and a second one's place, from pictures of the board."""
+"""``glovecal camera calibrate`` and ``colours``: what is measured from pictures before a hand is tracked.
+
+A camera's lens and a second one's place, from pictures of the board; the table by which the glove's colours
+are told.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from glovecal_service.cli.camera.extra import camera_extra
+from glovecal_service.cli.camera.sheets import Paper
+from glovecal_service.cli.camera.tracking_options import camera_extra
 from glovecal_service.cli.terminal.options import AsJson
-from glovecal_service.cli.terminal.printing import err, out, print_facts, print_json
-from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.printing import Refusal, err, out, print_facts, print_json
 
 if TYPE_CHECKING:
-    from glovecal_models.colour_glove.board_views import BoardView
-    from glovecal_models.colour_glove.camera_calibration import CameraCalibration, CameraPlacement
+    from glovecal_models.colour_glove.camera_calibration import BoardView, CameraCalibration, CameraPlacement
     from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
+
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 MOST_PICTURES = 500
@@ -51,9 +55,12 @@ def calibrate(
 ) -> None:
     """Calibrate one camera or two with the printed board (glovecal camera sheets)."""
     with camera_extra():
-        from glovecal_models.colour_glove.board_views import board_views
-        from glovecal_models.colour_glove.camera_calibration import calibrate_camera, place_camera
-        from glovecal_models.colour_glove.camera_file import write_cameras
+        from glovecal_models.colour_glove.camera_calibration import (
+            board_views,
+            calibrate_camera,
+            place_camera,
+        )
+        from glovecal_models.colour_glove.camera_model import write_cameras
         from glovecal_models.colour_glove.sheets.calibration_board import CalibrationBoard
 
     if (pictures is None) == (camera is None):
@@ -110,7 +117,7 @@ def _watched(
     """Views chosen from running cameras; ends when there are enough, at the end of a video, with the time."""
     from glovecal_client.errors import DeviceFinished
     from glovecal_client.pictures.source import build_source
-    from glovecal_models.colour_glove.board_views import ViewCollector
+    from glovecal_models.colour_glove.camera_calibration import ViewCollector
 
     opened = [build_source(source) for source in sources]
     collector = ViewCollector(board, len(opened))
@@ -176,7 +183,7 @@ def _turn_deg(where: CameraPlacement) -> float:
 def _documents(
     alone: Sequence[CameraCalibration], placed: Sequence[CameraPlacement]
 ) -> list[dict[str, object]]:
-    from glovecal_models.colour_glove.camera_file import camera_document
+    from glovecal_models.colour_glove.camera_model import camera_document
 
     found = []
     for each, where in zip(alone, [None, *placed], strict=True):
@@ -197,4 +204,92 @@ def _documents(
                 "views": where.views,
             }
         found.append(document)
+    return found
+
+
+SUFFIX = ".npz"
+
+
+def colours(
+    pictures: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Pictures of the printed colour card in the light of the recording; or with --labelled "
+            "of the glove.",
+            exists=True,
+            dir_okay=False,
+            show_default=False,
+        ),
+    ],
+    file: Annotated[Path, typer.Option("--out", help="Colour table to write (.npz).", dir_okay=False)],
+    paper: Annotated[Paper, typer.Option(help="What the card is printed on.")] = Paper.a4,
+    corners: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the card's page in a single picture, pixels from the left and the top, with the clock: "
+            '"120,80 500,90 510,640 110,630". Default: they are found.'
+        ),
+    ] = None,
+    labelled: Annotated[
+        bool,
+        typer.Option(
+            "--labelled",
+            help="Beside each hand.jpg lies hand.labels.png, grey levels 0 (no glove) to 10 (its colours).",
+        ),
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make a colour table for glovecal camera track --colours: for a printer, a camera and its light.
+
+    From the card: its ten colours and the light's are measured, drawn photographs of the glove take them on,
+    and the table is learned on these. From labelled pictures it is learned on them alone.
+    """
+    with camera_extra():
+        from glovecal_models.colour_glove.pattern import COLOUR_NAMES, encoded_light
+        from glovecal_models.colour_glove.pictures.white_balance import card_colours
+        from glovecal_service.camera.tracking_setup import drawn_table, labelled_table, picture_file
+
+    if file.suffix != SUFFIX or not file.absolute().parent.is_dir():
+        raise Refusal(f"{file} cannot be written: a colour table ends in {SUFFIX}, in a folder that exists")
+    if labelled:
+        labelled_table(pictures).save(file)
+        if as_json:
+            print_json({"file": str(file), "pictures": len(pictures)})
+        else:
+            out.print(f"Learned on {len(pictures)} labelled pictures. Wrote {file}.")
+        return
+    card = card_colours(
+        [picture_file(each) for each in pictures], paper.value, None if corners is None else _corners(corners)
+    )
+    drawn_table(card=card).save(file)
+    levels = encoded_light(card.inks).tolist()
+    gains = {"red": card.gains.red, "green": card.gains.green, "blue": card.gains.blue}
+    if as_json:
+        print_json(
+            {
+                "file": str(file),
+                "pictures": len(pictures),
+                "corners_px": card.corners_px.tolist(),
+                "gains": gains,
+                "srgb": dict(zip(COLOUR_NAMES, levels, strict=True)),
+            }
+        )
+        return
+    for number, (name, level) in enumerate(zip(COLOUR_NAMES, levels, strict=True), 1):
+        out.print(f"{number:2} {name}: sRGB {' '.join(map(str, level))} in white light")
+    out.print(
+        f"The light: red / green {1 / gains['red']:.2f}, blue / green {1 / gains['blue']:.2f} (1: white). "
+        f"Learned on drawn photographs in these colours. Wrote {file}."
+    )
+
+
+def _corners(text: str) -> np.ndarray:
+    try:
+        found = np.array([[float(value) for value in pair.split(",")] for pair in text.split()])
+    except ValueError:
+        found = np.zeros(0)
+    if found.shape != (4, 2) or not np.isfinite(found).all():
+        raise typer.BadParameter(
+            f'--corners {text!r}: expected four pairs, as in "120,80 500,90 510,640 110,630"'
+        )
     return found

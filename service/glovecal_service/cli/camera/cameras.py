@@ -1,17 +1,58 @@
-"""``glovecal camera``: a file for each verb."""
+"""``glovecal camera``: the verbs of a camera and the printed colour glove."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
-from glovecal_service.cli.camera import calibrate, colours, estimates, patterns, shape, sheets, store, track
+from glovecal_service.cli.camera.calibrate import calibrate, colours
+from glovecal_service.cli.camera.recorded import estimates, shape
+from glovecal_service.cli.camera.sheets import patterns, sheets
+from glovecal_service.cli.camera.track import track
+from glovecal_service.cli.camera.tracking_options import with_tracking
+from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.options import AsJson
+from glovecal_service.cli.terminal.printing import out, print_json
+
+
+def store(
+    name: Annotated[
+        str, typer.Argument(help="Name to keep them under: a-z, 0-9, _ and -.", show_default=False)
+    ],
+    colours: Annotated[
+        Path | None,
+        typer.Option(help="Colour table, as glovecal camera colours makes it.", exists=True, dir_okay=False),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="As glovecal camera calibrate makes it.", exists=True, dir_okay=False),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Keep a colour table, a calibration or both with the service, for cameras started over REST."""
+    given = {"colours": colours, "calibrations": calibration}
+    if not any(given.values()):
+        raise typer.BadParameter("give --colours FILE, --calibration FILE or both")
+    known = {}
+    with connect() as service:
+        for kind, file in given.items():
+            if file is not None:
+                known = service.put(f"/camera-files/{kind}/{name}", {"upload": service.upload(file)})
+    if as_json:
+        print_json(known)
+        return
+    for kind in given:
+        out.print(f"{kind}: {', '.join(known[kind]) or 'none'}")
+
 
 app = typer.Typer(help="A camera and the printed colour glove.", no_args_is_help=True)
-app.command("sheets")(sheets.sheets)
-app.command("calibrate")(calibrate.calibrate)
-app.command("colours")(colours.colours)
-app.command("store")(store.store)
-app.command("patterns")(patterns.patterns)
-app.command("shape")(shape.shape)
-app.command("track")(track.track)
-app.command("estimates")(estimates.estimates)
+app.command("sheets")(sheets)
+app.command("calibrate")(calibrate)
+app.command("colours")(colours)
+app.command("store")(store)
+app.command("patterns")(patterns)
+app.command("shape")(with_tracking(shape, "stage", "shape"))
+app.command("track")(with_tracking(track))
+app.command("estimates")(with_tracking(estimates))

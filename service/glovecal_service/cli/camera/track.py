@@ -4,28 +4,14 @@ from __future__ import annotations
 
 import threading
 from enum import Enum
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.camera.tracking_options import (
-    CalibrationOption,
-    ClipsOption,
-    ColoursOption,
-    DataOption,
-    EntriesOption,
-    HandOption,
-    ShapeOption,
-    Stage,
-    StageOption,
-    SubjectOption,
-    worn_by,
-)
+from glovecal_service.cli.camera.tracking_options import TrackingOptions
 from glovecal_service.cli.glove.capture import GloveOption
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, Site, Zenoh
-from glovecal_service.cli.terminal.printing import err
-from glovecal_service.cli.terminal.refusal import EXPECTED, exit_code_of, sentence_of
+from glovecal_service.cli.terminal.printing import EXPECTED, err, exit_code_of, sentence_of
 
 
 class Kept(Enum):
@@ -43,7 +29,7 @@ def track(
         ),
     ],
     glove: GloveOption,
-    stage: StageOption = Stage.dense,
+    tracking: TrackingOptions,
     keep: Annotated[
         Kept,
         typer.Option(
@@ -51,32 +37,20 @@ def track(
             "about 0.5 GB an hour, can be tracked again and shows no face."
         ),
     ] = Kept.labels,
-    colours: ColoursOption = None,
-    calibration: CalibrationOption = None,
-    shape: ShapeOption = None,
-    subject: SubjectOption = None,
-    hand: HandOption = None,
-    entries: EntriesOption = 20_000,
-    clips: ClipsOption = 36,
     connect: Zenoh = DEFAULT_ZENOH,
     site: Site = "lab",
-    data: DataOption = Path("glovecal-data"),
 ) -> None:
     """Track the colour glove and publish its poses like any glove's. Ctrl-C stops it.
 
     The first start builds the pose database and takes a minute or two.
     """
-    from glovecal_client.signals import stopped_by_signals
-    from glovecal_client.standard_streams import leave_at_once, say
+    from glovecal_client.program import leave_at_once, say, stopped_by_signals
     from glovecal_service.camera.camera_settings import CameraSettings
     from glovecal_service.camera.process import run_camera
 
-    sizes_mm, worn_on = worn_by(subject, hand)
     settings = CameraSettings(
-        source, glove, site, connect, subject, keep.value, data=data,
-        hand=worn_on, stage=stage.value, colours=colours,
-        calibration=calibration, shape=shape, entries=entries, clips=clips, sizes_mm=sizes_mm,
-    )  # fmt: skip
+        source, glove, site, connect, tracking.subject, keep.value, **tracking.settings()
+    )
     stop = threading.Event()
     try:
         with stopped_by_signals(stop, outlives_terminal=True):

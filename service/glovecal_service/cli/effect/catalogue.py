@@ -9,7 +9,14 @@ import typer
 
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
-from glovecal_service.cli.terminal.printing import err, out, print_facts, print_json, print_table
+from glovecal_service.cli.terminal.printing import (
+    err,
+    out,
+    print_facts,
+    print_table,
+    read_or_print,
+)
+from glovecal_service.rest.effect.answer import CatalogueEffect
 
 COLUMNS = {
     "shown": "effect",
@@ -36,38 +43,37 @@ def effects(
     """List the physical effects that a calibration can know, or show one in full."""
     with connect() as service:
         found = service.get("/effects" if name is None else f"/effects/{quote(name, safe='')}")
-    if as_json:
-        print_json(found)
-    elif name is None:
-        print_table([_row(item) for item in found], COLUMNS, empty="There are none.")
-        err.print(LEGEND)
-    else:
-        _print_one(found)
+    if name is not None:
+        _print_one(read_or_print(CatalogueEffect, found, as_json))
+        return
+    rows = [_row(item) for item in read_or_print(list[CatalogueEffect], found, as_json)]
+    print_table(rows, COLUMNS, empty="There are none.")
+    err.print(LEGEND)
 
 
-def _row(item: dict[str, Any]) -> dict[str, Any]:
+def _row(item: CatalogueEffect) -> dict[str, Any]:
     return {
-        "shown": item["name"] + ("*" if item["own"] else ""),
-        "does": DOES.get(item["kind"], item["kind"]),
-        "needs": [f"c.{name}" for name in item["context"]],
-        "explanation": item["explanation"],
+        "shown": item.name + ("*" if item.own else ""),
+        "does": DOES.get(item.kind, item.kind),
+        "needs": [f"c.{name}" for name in item.context],
+        "explanation": item.explanation,
     }
 
 
-def _print_one(item: dict[str, Any]) -> None:
+def _print_one(item: CatalogueEffect) -> None:
     print_facts(
         {
-            "effect": item["name"],
-            "in a sentence": item["explanation"],
-            "what it does": DOES.get(item["kind"], item["kind"]),
-            "needs": [f"c.{name}" for name in item["context"]],
-            "remembers": item["has_memory"],
-            "control": item["control"],
-            "source": item["source"],
-            "comes with": f"{item['package']} (your own)" if item["own"] else item["package"],
+            "effect": item.name,
+            "in a sentence": item.explanation,
+            "what it does": DOES.get(item.kind, item.kind),
+            "needs": [f"c.{name}" for name in item.context],
+            "remembers": item.has_memory,
+            "control": item.control,
+            "source": item.source,
+            "comes with": f"{item.package} (your own)" if item.own else item.package,
         }
     )
-    if item["parameters"]:
+    if item.parameters:
         out.print("\nSearched for, beside weights:")
         columns = {"name": "parameter", "unit": "unit", "low": "from", "high": "to", "prior": "known before"}
-        print_table(item["parameters"], columns, empty="")
+        print_table(item.parameters, columns, empty="")

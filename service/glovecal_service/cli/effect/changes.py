@@ -8,13 +8,15 @@ from urllib.parse import quote
 
 import typer
 
-from glovecal_service.cli.take.rows import find_takes
+from glovecal_service.cli.take.rows import find_takes, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model
-from glovecal_service.cli.terminal.printing import out, print_json, print_table
-from glovecal_service.cli.terminal.waiting import wait_for_job
+from glovecal_service.cli.terminal.presenting import present
+from glovecal_service.cli.terminal.printing import read_or_print
+from glovecal_service.cli.terminal.waiting import begun_job, wait_for_job
+from glovecal_service.questions.add_effect import ADD_EFFECT
+from glovecal_service.questions.remove_effect import REMOVE_EFFECT
 
-ERRORS = {"rotation": "rotation", "before": "error before (°)", "after": "after (°)"}
 Effect = Annotated[str, typer.Argument(help="The effect's name, as in glovecal effects.")]
 Activate = Annotated[bool, typer.Option("--activate", help="Predict live with the new model.")]
 
@@ -46,45 +48,21 @@ def add_effect(
     """
     wanted: Any = effect if expression is None else {"declaration": _declaration_text(effect, expression)}
     with connect() as service:
-        rows = find_takes(service.get("/takes"), take or [])
+        rows = find_takes(stored_takes(service), take or [])
         body: dict[str, Any] = {"effect": wanted, "rotations": rotation or None, "activate": activate}
-        body["takes"] = [row["id"] for row in rows] or None
-        job = service.post(f"/models/{model}/effects", body)["id"]
-        result = wait_for_job(service, job, quiet=as_json)["result"]
-    if as_json:
-        print_json(result)
-        return
-    out.print(result["sentence"])
-    rows = [
-        {"rotation": name, "before": before, "after": result["after"].get(name)}
-        for name, before in result["before"].items()
-    ]
-    print_table(rows, ERRORS, empty="")
-    if result["model"] is None:
-        out.print(f"Model {model[:12]} stays as it is; nothing was stored.")
-    else:
-        _say_child(result)
-        out.print(f"Next: glovecal diagnose {result['model'][:12]}")
+        body |= {"takes": [row.id for row in rows] or None}
+        job = begun_job(service.post(f"/models/{model}/effects", body))
+        result = wait_for_job(service, job, quiet=as_json).result
+    present(read_or_print(ADD_EFFECT.answer, result, as_json).presentation())
 
 
 def remove_effect(model: Model, effect: Effect, activate: Activate = False, as_json: AsJson = False) -> None:
     """Take an effect out of a model: a child of it is learned without."""
     with connect() as service:
         query = {"activate": "true"} if activate else None
-        job = service.delete(f"/models/{model}/effects/{quote(effect, safe='')}", query)["id"]
-        result = wait_for_job(service, job, quiet=as_json)["result"]
-    if as_json:
-        print_json(result)
-        return
-    sentence = result["sentence"]
-    out.print(sentence[:1].upper() + sentence[1:])
-    _say_child(result)
-
-
-def _say_child(result: dict[str, Any]) -> None:
-    short = result["model"][:12]
-    active = "Active." if result["active"] else f"Not active; glovecal model activate {short} makes it so."
-    out.print(f"Model {short}, made from {result['parent'][:12]}. {active}")
+        job = begun_job(service.delete(f"/models/{model}/effects/{quote(effect, safe='')}", query))
+        result = wait_for_job(service, job, quiet=as_json).result
+    present(read_or_print(REMOVE_EFFECT.answer, result, as_json).presentation())
 
 
 def _declaration_text(name: str, expression: str) -> str:

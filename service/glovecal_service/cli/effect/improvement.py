@@ -2,48 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.rotations import Handedness
+from glovecal_service.cli.asking import options_of
 from glovecal_service.cli.glove.layouts import layout_named
 from glovecal_service.cli.take.files import FileSubject
-from glovecal_service.cli.take.rows import find_takes, takes_of
+from glovecal_service.cli.take.rows import find_takes, only_layout, stored_takes, takes_of
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.floor_doubts import print_floor_doubts
 from glovecal_service.cli.terminal.options import AsJson, OnlyHand, subject_named
-from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
-from glovecal_service.cli.terminal.refusal import Refusal
-from glovecal_service.cli.terminal.waiting import wait_for_job
-from glovecal_service.cli.terminal.writing import (
+from glovecal_service.cli.terminal.presenting import present
+from glovecal_service.cli.terminal.printing import (
     Overwrite,
+    Refusal,
     Report,
+    err,
     fetch_job_report,
+    read_or_print,
     require_place,
     write_report,
 )
+from glovecal_service.cli.terminal.waiting import begun_job, wait_for_job
+from glovecal_service.questions.improve import IMPROVE, ImprovementRequest
+from glovecal_service.rest.take.answer import Take
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 MANY = ("--takes", "--holdout", "--take", "-t")
-STOPPED = {
-    "noise_floor": "the error is at its noise floor",
-    "nothing_named": "no known effect beats its control significantly",
-    "ambiguous": "these takes cannot tell the causes apart",
-    "not_better": "the next effect did not reduce the held-out error enough and was undone",
-}
-STEPS = {
-    "model": "model",
-    "added": "added",
-    "rmse_unseen_wearing_deg": "next wearing (°)",
-    "rmse_deg": "error (°)",
-}
-Method = Literal["lmc_gpr", "linear", "spgp", "auto", "polynomial_gpr", "general_gpr"]
 
 
 class SeveralFiles(TyperCommand):
@@ -61,7 +52,9 @@ class SeveralFiles(TyperCommand):
         return super().parse_args(ctx, repeated)
 
 
+@options_of(ImprovementRequest, "method", "samples", "max_steps", "seed", "ceiling", "activate")
 def improve(
+    asked: dict[str, Any],
     takes: Annotated[
         list[Path] | None,
         typer.Option(exists=True, dir_okay=False, help="Take tables (CSV, Parquet) to learn from; several."),
@@ -88,18 +81,10 @@ def improve(
         typer.Option("--layout", "-l", help="Layout name or layout file. Default: made of the columns."),
     ] = None,
     hand: OnlyHand = None,
-    method: Annotated[Method, typer.Option(help="The base that effects are added to.")] = "lmc_gpr",
-    samples: Annotated[int, typer.Option(min=10, max=5000, help="Most samples for one rotation.")] = 2000,
-    max_steps: Annotated[int, typer.Option(min=0, max=20, help="Effects to add at most.")] = 6,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is chosen at random.")] = 0,
-    ceiling: Annotated[
-        bool, typer.Option(help="Ask at the end whether anything is left to gain from what was recorded.")
-    ] = True,
     spread_equal_times: Annotated[
         bool,
         typer.Option("--spread-equal-times", help="Frames stamped in batches: spread each over its batch."),
     ] = False,
-    activate: Annotated[bool, typer.Option("--activate", help="Predict live with the last model.")] = False,
     report: Report = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -116,17 +101,15 @@ def improve(
         chosen = _chosen(
             service, takes or [], holdout or [], take or [], subject, layout, hand, spread=spread_equal_times
         )
-        options = {"method": method, "samples": samples, "max_steps": max_steps, "seed": seed}
-        options["ceiling"] = ceiling
-        job = service.post("/improve", {**chosen, **options, "activate": activate})["id"]
-        result = wait_for_job(service, job, quiet=as_json)["result"]
-        page = fetch_job_report(service, job) if report is not None else b""
+        job = begun_job(service.post("/improve", {**chosen, **asked}))
+        result = wait_for_job(service, job, quiet=as_json).result
+        page = fetch_job_report(service, job, report) if report is not None else b""
     if report is not None:
         write_report(report, page, as_json=as_json)
-    if as_json:
-        print_json(result)
-    else:
-        _print(chosen["subject"], method, result, active=activate)
+    answer = read_or_print(IMPROVE.answer, result, as_json)
+    for sentence in answer.sentences:
+        err.print(sentence)
+    present(answer.presentation())
 
 
 def _chosen(
@@ -155,64 +138,25 @@ def _chosen(
         subject = of_files.name
         learned, held = of_files.take_ids(files), of_files.take_ids(held_files)
         layout = of_files.layout
-    rows = service.get("/takes", {"subject": subject})
-    held += [row["id"] for row in find_takes(rows, held_names)]
-    learned += [row["id"] for row in find_takes(rows, take)]
+    rows = stored_takes(service, subject=subject)
+    held += [row.id for row in find_takes(rows, held_names)]
+    learned += [row.id for row in find_takes(rows, take)]
     if not learned:
         learned = [
-            row["id"]
+            row.id
             for row in takes_of(rows, hand)
-            if row["rotations"] and row["id"] not in held and layout in (None, row["layout"])
+            if row.rotations and row.id not in held and layout in (None, row.layout)
         ]
-    layouts = sorted({row["layout"] for row in rows if row["id"] in {*learned, *held}})
     if not learned:
         raise Refusal(
             f"subject {subject} has no take with reference angles to learn from; import some with glovecal "
             f"take import, or name files with --takes{_poses_instead(rows, subject)}"
         )
-    if len(layouts) > 1:
-        raise Refusal(f"the takes have layouts {', '.join(layouts)}; choose one with --layout")
-    return {"subject": subject, "layout": layout or layouts[0], "takes": learned, "holdout": held or None}
+    of_all = only_layout(row for row in rows if row.id in {*learned, *held})
+    return {"subject": subject, "layout": layout or of_all, "takes": learned, "holdout": held or None}
 
 
-def _poses_instead(rows: Sequence[Mapping[str, Any]], subject: str | None) -> str:
+def _poses_instead(rows: Sequence[Take], subject: str | None) -> str:
     if not rows:
         return ""
     return f"; glovecal take holds --subject {subject} shows what readings do in held poses"
-
-
-def _print(subject: str, method: str, result: Mapping[str, Any], *, active: bool) -> None:
-    rows = [
-        {
-            "model": step["model"][:12],
-            "added": _added(step["added"], method),
-            "rmse_unseen_wearing_deg": step["rmse_unseen_wearing_deg"],
-            "rmse_deg": step["rmse_deg"],
-        }
-        for step in result["steps"]
-    ]
-    print_table(rows, STEPS, empty="", folds="added")
-    floors = ", ".join(f"{name} {value:.2f}" for name, value in (result["noise_floor_deg"] or {}).items())
-    out.print(f"Noise floors (°): {floors or 'unknown'}")
-    print_floor_doubts(result["noise_floors"])
-    out.print(f"Stopped: {STOPPED.get(result['stopped'], result['stopped'])}.")
-    for sentence in result["sentences"]:
-        err.print(sentence)
-    following = result["next_take"]
-    if following:
-        rivals = " and ".join(following["separates"])
-        out.print(f"To separate {rivals}, record {following['seconds']} s: {following['what']}")
-    last = result["steps"][-1]["model"][:12]
-    out.print(f"The models are kept for subject {subject}.")
-    out.print("The last is active." if active else f"Next: glovecal model activate {last}")
-
-
-def _added(added: Mapping[str, Any] | None, method: str) -> str:
-    if added is None:
-        return f"{method} alone"
-    rivals = [name for name in added.get("confidence_set") or () if name != added["effect"]]
-    doubt = f" (or {', '.join(rivals)})" if rivals else ""
-    if added["verdict"] == "associated":
-        column = added.get("associated_with")
-        doubt = f" (associated{f' with {column}' if column else ''}; no cause is claimed)"
-    return f"{added['effect']} on {', '.join(added['where'])}{doubt}"

@@ -51,22 +51,19 @@ def capture(
 ) -> None:
     """Record a glove to the local log and publish it. Ctrl-C stops it."""
     from glovecal_client.capture.command import parse_options, run_capture, tell
-    from glovecal_client.signals import stopped_by_signals
-    from glovecal_client.standard_streams import never_wait, say
+    from glovecal_client.capture.daemon import CaptureSettings
+    from glovecal_client.keys import GloveKeys
+    from glovecal_client.program import never_wait, say, stopped_by_signals
 
     keep_private()
     never_wait()
     stop = threading.Event()
+    settings = CaptureSettings(GloveKeys(site, glove), subject, wearing, (connect,), data)
     with stopped_by_signals(stop, outlives_terminal=True):
         summary = run_capture(
             device,
-            glove,
-            options=parse_options(option or []),
-            site=site,
-            subject=subject,
-            wearing=wearing,
-            endpoints=[connect],
-            data=data,
+            settings,
+            parse_options(option or []),
             stop=stop,
             report=tell,  # not the console: it ends the program where nobody reads
         )

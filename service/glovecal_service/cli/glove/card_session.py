@@ -9,6 +9,8 @@ import typer
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import err, out, print_json, print_table
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Card, GloveAnswers
 
 COLUMNS = {
     "glove": "glove",
@@ -40,29 +42,29 @@ def card(
         raise typer.BadParameter("give one of --set-clock, --start and --stop")
     body = {"gloves": gloves, "do": asked[0] if asked else "status", "argument": start or ""}
     with connect() as service:
-        found = service.post("/glove-commands", body)
-    answers: list[dict[str, Any]] = found["answers"]
+        document = service.post("/glove-commands", body)
+    found = read(GloveAnswers, document)
     if as_json:
-        print_json(found)
+        print_json(document)
     else:
-        print_table([row(item) for item in answers if item["answer"]], COLUMNS, empty="No glove answered.")
-        for told in found["sentences"]:
+        rows = [row(item.glove, item.card) for item in found.answers if item.answer]
+        print_table(rows, COLUMNS, empty="No glove answered.")
+        for told in found.sentences:
             out.print(told)
-    for item in answers:
-        if item["problem"]:
-            err.print(f"{item['glove']}: {item['problem']}", style="red")
-    if any(item["problem"] for item in answers):
+    refused = [item for item in found.answers if item.problem]
+    for item in refused:
+        err.print(f"{item.glove}: {item.problem}", style="red")
+    if refused:
         raise typer.Exit(REFUSED)
 
 
-def row(item: dict[str, Any]) -> dict[str, Any]:
+def row(glove: str, card: Card) -> dict[str, Any]:
     """An answer as a row of the table."""
-    answer = item["answer"]
-    clock = answer.get("clock") or {}
+    clock = card.clock
     return {
-        "glove": item["glove"],
-        **{name: answer.get(name) for name in ("battery_v", "active_file", "free_mb")},
-        "files": ", ".join(answer.get("files") or ()),
-        "ahead_ms": round(1e3 * clock["ahead_s"], 1) if clock else None,
-        "sd_ms": round(1e3 * clock["sd_s"], 1) if clock else None,
+        **vars(card),
+        "glove": glove,
+        "files": ", ".join(card.files or ()),
+        "ahead_ms": round(1e3 * clock.ahead_s, 1) if clock else None,
+        "sd_ms": round(1e3 * clock.sd_s, 1) if clock else None,
     }

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from glovecal_client.errors import ClientError, NoAnswer
-from glovecal_models.hand.handedness import HANDS, is_of_hand, known_hand
+from glovecal_models.hand.rotations import HANDS, is_of_hand, known_hand
 from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
-from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.connection import connect, stored_models
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
-from glovecal_service.cli.terminal.printing import err, out, print_json
-from glovecal_service.cli.terminal.refusal import NobodyThere, sentence_of
+from glovecal_service.cli.terminal.printing import NobodyThere, err, out, print_json, sentence_of
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Gloves
+from glovecal_service.rest.subject.answer import Subject
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -58,8 +60,7 @@ def doctor(
 def _findings(glove: str, seconds: float, endpoint: str, site: str) -> tuple[list[GloveFinding], int]:
     """And how many frames came. Raises NoAnswer without a service."""
     from glovecal_client.keys import GloveKeys
-    from glovecal_client.queries import ask_json
-    from glovecal_client.session import open_client
+    from glovecal_client.session import ask_json, open_client
     from glovecal_models.diagnosis.worn_glove import GloveFinding, worn_glove_findings
     from glovecal_models.takes.take import Take
 
@@ -126,26 +127,26 @@ def _model(glove: str, meta: Mapping[str, Any]) -> tuple[CalibrationModel | None
             if not subject:
                 put = f"Say who wears it: glovecal glove wear {glove} SUBJECT."
                 return None, [GloveFinding("model", f"Nobody is known to wear {glove}.", put)]
-            known = {row["name"]: row["hand"] for row in service.get("/subjects")}
+            known = {row.name: row.hand for row in read(list[Subject], service.get("/subjects"))}
             if subject not in known:
                 add = f"Add the subject, then sample or train: glovecal subject add {subject}."
                 return None, [GloveFinding("model", f"{subject}, who wears {glove}, is no subject yet.", add)]
             hand, worn, found = known[subject], known_hand(meta.get("hand")), []
-            query = {"subject": subject, "layout": str(meta.get("layout"))}
-            models = service.get("/models", query)
-            if worn and hand in HANDS and worn not in (hand, *(row["hand"] for row in models)):
+            models = stored_models(service, subject=subject, layout=str(meta.get("layout")))
+            if worn and hand in HANDS and worn not in (hand, *(row.hand for row in models)):
                 wrong = f"{glove} is a {worn} glove, {subject} is a {hand} hand."
                 found.append(GloveFinding("model", wrong, "Exchange the gloves, or say who wears this one."))
-            active = [row for row in models if row["active"] and is_of_hand(row["hand"], worn)]
+            active = [row for row in models if row.active and is_of_hand(row.hand, worn)]
             if not active:
                 none = f"No model of {subject} with layout {meta.get('layout')} is active."
                 train = f"Train one, or choose one: glovecal train --subject {subject}."
                 return None, [*found, GloveFinding("model", none, train)]
-            return load(service.download(f"/models/{active[0]['id']}/export")), found
+            return load(service.download(f"/models/{active[0].id}/export")), found
     except ClientError as error:
         said = f"The service does not say which model is served: {sentence_of(error)}."
         return None, [GloveFinding("model", said, "See what glovecal serve says.")]
 
 
 def _wearer(service: RestClient, glove: str) -> str | None:
-    return next((row["subject"] for row in service.get("/gloves")["seen"] if row["name"] == glove), None)
+    seen = read(Gloves, service.get("/gloves")).seen
+    return next((row.subject for row in seen if row.name == glove), None)

@@ -48,8 +48,8 @@ def emulate(
 ) -> None:
     """Emulate a glove, byte by byte, moved by the simulated hand. Ctrl-C stops it."""
     from glovecal_service.emulators import catalogue
-    from glovecal_service.emulators.emulation import Emulation
     from glovecal_service.emulators.hand import MovingHand
+    from glovecal_service.emulators.ports import Emulation
 
     chosen = catalogue.protocol(protocol)
     faults = catalogue.faults_of(protocol, fault or [], seed)

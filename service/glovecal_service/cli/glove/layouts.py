@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,8 +12,18 @@ from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, identifier, subject_named
-from glovecal_service.cli.terminal.printing import moment, out, print_json, print_table
-from glovecal_service.cli.terminal.refusal import REFUSED, Refusal, exit_code_of, sentence_of
+from glovecal_service.cli.terminal.printing import (
+    REFUSED,
+    Refusal,
+    exit_code_of,
+    out,
+    print_json,
+    print_table,
+    read_or_print,
+    sentence_of,
+)
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Gloves, LatencyView, LayoutView
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -28,12 +38,10 @@ def list_gloves(as_json: AsJson = False) -> None:
     """List layouts and the gloves seen on the network."""
     with connect() as service:
         document = service.get("/gloves")
-    if as_json:
-        print_json(document)
-        return
+    found = read_or_print(Gloves, document, as_json)
     layouts = [
-        {**item, "sensors": len(item["sensors"]), "rotations": len(item["rotations"])}
-        for item in document["layouts"]
+        {**vars(item), "sensors": len(item.sensors), "rotations": len(item.rotations)}
+        for item in found.layouts
     ]
     print_table(
         layouts,
@@ -42,10 +50,7 @@ def list_gloves(as_json: AsJson = False) -> None:
     )
     out.print()
     print_table(
-        [
-            {**item, "last_seen_at": moment(item["last_seen_at"]), "latency": _latency(item["latency"])}
-            for item in document["seen"]
-        ],
+        [{**vars(item), "latency": _latency(item.latency)} for item in found.seen],
         {
             "name": "glove",
             "layout": "layout",
@@ -59,10 +64,10 @@ def list_gloves(as_json: AsJson = False) -> None:
     )
 
 
-def _latency(measured: dict[str, Any] | None) -> str:
+def _latency(measured: LatencyView | None) -> str:
     if measured is None:
         return ""
-    return f"{1000 * measured['latency_s']:.0f} ± {1000 * measured['sd_s']:.1f}"
+    return f"{1000 * measured.latency_s:.0f} ± {1000 * measured.sd_s:.1f}"
 
 
 @app.command("show")
@@ -73,7 +78,7 @@ def show(name: Layout, as_json: AsJson = False) -> None:
     """
     with connect() as service:
         document = service.get(f"/gloves/{name}")
-    print_json(document if as_json else document["document"])
+    print_json(document if as_json else read(LayoutView, document).document)
 
 
 @app.command("add")
@@ -83,10 +88,8 @@ def add(
     """Add a layout of your own from a file."""
     with connect() as service:
         name = add_layout_file(service, file)
-        document = service.get(f"/gloves/{name}")
-    out.print(
-        f"Added layout {name}: {len(document['sensors'])} sensors, {len(document['rotations'])} rotations."
-    )
+        found = read(LayoutView, service.get(f"/gloves/{name}"))
+    out.print(f"Added layout {name}: {len(found.sensors)} sensors, {len(found.rotations)} rotations.")
 
 
 @app.command("wear")
@@ -108,7 +111,7 @@ def wear(
 
 def add_layout_file(service: RestClient, file: Path) -> str:
     """Store the layout in a TOML or JSON file; its name. Raises Refusal that names the file."""
-    from glovecal_client.layout_file import layout_name
+    from glovecal_client.rest import layout_name
 
     try:
         check_identifier(layout_name(file.read_bytes(), file), "name of the layout")

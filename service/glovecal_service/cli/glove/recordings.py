@@ -11,9 +11,10 @@ import typer
 from glovecal_service.cli.glove.beside import finish_video, video_beside, warn_of_cold_gloves
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, subject_named
-from glovecal_service.cli.terminal.printing import err, out, print_json
-from glovecal_service.cli.terminal.refusal import NobodyThere
+from glovecal_service.cli.terminal.printing import NobodyThere, err, out, print_json
 from glovecal_service.cli.terminal.waiting import wait_seconds
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Recording
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -68,64 +69,63 @@ def record(
             if film is not None:
                 finish_video(service, film, finished)
     if as_json:
-        print_json(finished[0] if both is None else finished)
+        documents = [one.model_dump(mode="json") for one in finished]
+        print_json(documents[0] if both is None else documents)
         return
     for one in finished:
         _tell(one, told_pre_roll=bool(pre_roll))
 
 
-def start_takes(
-    service: RestClient, gloves: Sequence[str], wanted: Mapping[str, Any]
-) -> list[dict[str, Any]]:
+def start_takes(service: RestClient, gloves: Sequence[str], wanted: Mapping[str, Any]) -> list[Recording]:
     """Ask for a recording of each glove and wait until all go on. Raises NobodyThere; then none goes on."""
     known = {key: value for key, value in wanted.items() if value is not None}
-    started: list[dict[str, Any]] = []
+    started: list[Recording] = []
     try:
         for glove in gloves:
-            started.append(service.post("/recordings", {"glove": glove, **known}))
+            started.append(read(Recording, service.post("/recordings", {"glove": glove, **known})))
         for one in started:
-            _wait_for_the_recorder(service, one["id"], one["glove"])
+            _wait_for_the_recorder(service, one)
     except BaseException:
         _stop(service, started)
         raise
     return started
 
 
-def finish_takes(service: RestClient, started: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def finish_takes(service: RestClient, started: Sequence[Recording]) -> list[Recording]:
     """Stop all, then wait for their accounts."""
     _stop(service, started)
-    return [service.finish_recording(one["id"]) for one in started]
+    return [read(Recording, service.finish_recording(one.id)) for one in started]
 
 
-def _stop(service: RestClient, started: Sequence[Mapping[str, Any]]) -> None:
+def _stop(service: RestClient, started: Sequence[Recording]) -> None:
     for one in started:
-        service.post(f"/recordings/{one['id']}/stop")
+        service.post(f"/recordings/{one.id}/stop")
 
 
-def _tell(finished: Mapping[str, Any], *, told_pre_roll: bool) -> None:
-    facts = finished["facts"]
-    if "take" in facts:
+def _tell(finished: Recording, *, told_pre_roll: bool) -> None:
+    account = finished.account
+    if account.take is not None:
         out.print(
-            f"Take {facts['take'][:12]}: {facts['recorded']} of {facts['sent']} frames sent, "
-            f"{facts['repaired']} fetched from the capture log, {facts['missing_frames']} missing."
+            f"Take {account.take[:12]}: {account.recorded} of {account.sent} frames sent, "
+            f"{account.repaired} fetched from the capture log, {account.missing_frames} missing."
         )
-    if finished["state"] == "repairing":
+    if finished.state == "repairing":
         err.print(
-            f"Recording {finished['id']} is {facts['sentence']}. It completes as soon as capture answers; "
+            f"Recording {finished.id} is {account.sentence}. It completes as soon as capture answers; "
             "glovecal take list shows its state.",
             style="yellow",
         )
-    if told_pre_roll and "take" in facts:
-        out.print(f"Pre-roll: {facts['pre_roll']['sentence']}.")
+    if told_pre_roll and account.take is not None:
+        out.print(f"Pre-roll: {account.pre_roll.sentence}.")
 
 
-def _wait_for_the_recorder(service: RestClient, recording: str, glove: str) -> None:
+def _wait_for_the_recorder(service: RestClient, one: Recording) -> None:
     """Raises NobodyThere when no recorder takes it on: then nothing would be recorded."""
     until = time.monotonic() + BEGINS_WITHIN_S
-    while service.get(f"/recordings/{recording}")["state"] == "requested":
+    while read(Recording, service.get(f"/recordings/{one.id}")).state == "requested":
         if time.monotonic() > until:
             raise NobodyThere(
-                f"recording {recording} of glove {glove} did not start within {BEGINS_WITHIN_S:g} s; is "
+                f"recording {one.id} of glove {one.glove} did not start within {BEGINS_WITHIN_S:g} s; is "
                 "glovecal serve running on this data folder?"
             )
         time.sleep(0.05)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_models.hand.handedness import known_hand
 from glovecal_models.takes.session_drift import SHAPES
 from glovecal_service.cli.glove.beside import finish_video, video_beside, warn_of_cold_gloves
 from glovecal_service.cli.glove.recordings import finish_takes, start_takes
@@ -16,6 +15,8 @@ from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import err, out, print_json
 from glovecal_service.cli.terminal.waiting import wait_seconds
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Gloves, Recording
 
 
 def shapes(
@@ -35,30 +36,31 @@ def shapes(
     """
     with connect() as service, video_beside(video, f"{at}-shapes-{datetime.now():%H%M%S}") as film:
         warn_of_cold_gloves(service, gloves, wait=warm_up)
-        takes: list[dict[str, Any]] = []
+        takes: list[Recording] = []
         for shape, ask in SHAPES.items():
             err.print(f"{shape}: {ask}")
             wait_seconds(pause, "get ready", quiet=as_json)
             started = start_takes(service, gloves, {"name": f"{at}-{shape}", "lead_s": 0})
             wait_seconds(seconds, f"hold {shape}", quiet=as_json)
             takes += finish_takes(service, started)
-        seen = {glove["name"]: known_hand(glove["hand"]) for glove in service.get("/gloves")["seen"]}
-        worn = dict.fromkeys((one["subject"], seen[one["glove"]]) for one in takes if one["subject"])
-        drifts = [_drift(service, *each) for each in worn] if at == "end" else []
+        seen = {row.name: row.known_hand for row in read(Gloves, service.get("/gloves")).seen}
+        worn = dict.fromkeys((one.subject, seen[one.glove]) for one in takes if one.subject)
+        drifts = {each: _drift(service, *each) for each in worn} if at == "end" else {}
         if film is not None:
             finish_video(service, film, takes)
     if as_json:
-        print_json({"takes": takes, "drifts": drifts})
+        told = [{**found, "subject": subject, "hand": hand} for (subject, hand), found in drifts.items()]
+        print_json({"takes": [one.model_dump(mode="json") for one in takes], "drifts": told})
         return
     out.print(f"{len(takes)} takes of {len(SHAPES)} shapes.")
-    for drift in drifts:
-        of = f"{drift['subject']}, {drift['hand']} hand" if drift["hand"] else drift["subject"]
-        out.print(f"{of}: {drift['sentence']}")
+    for (subject, hand), found in drifts.items():
+        of = f"{subject}, {hand} hand" if hand else subject
+        out.print(f"{of}: {found.get('sentence')}")
 
 
 def _drift(service: Any, subject: str, hand: str | None) -> dict[str, Any]:
-    worn = {"subject": subject, "hand": hand}
+    """What is told of it, or only why nothing can be."""
     try:
-        return service.post("/takes/session-drift", worn) | worn
+        return service.post("/takes/session-drift", {"subject": subject, "hand": hand})
     except ServiceError as error:
-        return worn | {"sentence": error.detail or str(error)}
+        return {"sentence": error.detail or str(error)}

@@ -17,8 +17,7 @@ from rich.text import Text
 
 from glovecal_client.errors import NoAnswer
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
-from glovecal_service.cli.terminal.printing import err, out, show
-from glovecal_service.cli.terminal.refusal import NobodyThere, Refusal
+from glovecal_service.cli.terminal.printing import NobodyThere, Refusal, err, out, show
 
 if TYPE_CHECKING:
     import zenoh
@@ -64,7 +63,7 @@ class _Counts:
     def __init__(self, session: zenoh.Session, site: str, glove: str) -> None:
         import zenoh
 
-        from glovecal_client.queries import ask_json
+        from glovecal_client.session import ask_json
         from glovecal_service.realtime.service_status import all_service_statuses
 
         self.newest: dict[str, int] | None = None
@@ -76,7 +75,7 @@ class _Counts:
             self._note(ask_json(session, all_service_statuses(site), timeout_s=1.0))
 
     def _hear(self, sample: zenoh.Sample) -> None:
-        from glovecal_client.queries import json_object
+        from glovecal_client.session import json_object
 
         self._note(json_object(sample.payload.to_bytes()) or {})
 
@@ -85,8 +84,8 @@ class _Counts:
         self.warnings = [f"{one['sentence']} {one['advice']}" for one in counts.get("warnings", [])]
         if "sent" in counts:
             names = ("sent", "received", "missing", "predicted", "skipped")
-            self.newest = {name: counts[name] for name in names}
-            self.newest["refused"] = sum(counts["refused"].values())
+            refused = sum(counts["refused"].values())
+            self.newest = {**{name: counts[name] for name in names}, "refused": refused}
 
 
 def _follow(poses: PoseSubscriber, counts: _Counts, glove: str, until: float | None, as_json: bool) -> None:

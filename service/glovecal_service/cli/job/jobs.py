@@ -6,8 +6,10 @@ import typer
 
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Job
-from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table
+from glovecal_service.cli.terminal.printing import out, print_facts, print_json, print_table, read_or_print
 from glovecal_service.cli.terminal.waiting import wait_for_job
+from glovecal_service.plain import read
+from glovecal_service.rest.job.answer import Job as JobRow
 
 app = typer.Typer(help="Jobs (long work): state, progress, cancel.", no_args_is_help=True)
 
@@ -16,12 +18,10 @@ app = typer.Typer(help="Jobs (long work): state, progress, cancel.", no_args_is_
 def list_jobs(as_json: AsJson = False) -> None:
     """List jobs, newest first."""
     with connect() as service:
-        rows = service.get("/jobs")
-    if as_json:
-        print_json(rows)
-        return
+        found = service.get("/jobs")
+    rows = read_or_print(list[JobRow], found, as_json)
     shown = [
-        {**row, "done": f"{100 * row['fraction']:.0f} %", "last": row["error"] or row["sentence"]}
+        {**vars(row), "done": f"{100 * row.fraction:.0f} %", "last": row.error or row.sentence}
         for row in rows
     ]
     columns = {"id": "job", "kind": "kind", "subject": "subject", "state": "state", "done": "done"}
@@ -37,37 +37,34 @@ def show(job: Job, as_json: AsJson = False) -> None:
     """Show one job."""
     with connect() as service:
         document = service.get(f"/jobs/{job}")
-    if as_json:
-        print_json(document)
-        return
-    result = document["result"] or {}
+    row = read_or_print(JobRow, document, as_json)
     print_facts(
         {
-            "job": document["id"],
-            "kind": f"{document['kind']} {document['payload'].get('method', '')}".strip(),
-            "subject": document["subject"],
-            "state": document["state"],
-            "done": f"{100 * document['fraction']:.0f} %",
-            "last message": document["sentence"] or None,
-            "error": document["error"],
-            "model": result.get("model"),
-            "attempt": document["attempt"],
-            "created": moment(document["created_at"]),
-            "started": moment(document["started_at"]),
-            "finished": moment(document["finished_at"]),
+            "job": row.id,
+            "kind": f"{row.kind} {row.payload.get('method', '')}".strip(),
+            "subject": row.subject,
+            "state": row.state,
+            "done": f"{100 * row.fraction:.0f} %",
+            "last message": row.sentence or None,
+            "error": row.error,
+            "model": (row.result or {}).get("model"),
+            "attempt": row.attempt,
+            "created": row.created_at,
+            "started": row.started_at,
+            "finished": row.finished_at,
         }
     )
-    if document["traceback"]:
-        out.print(f"\n{document['traceback'].rstrip()}")
+    if row.traceback:
+        out.print(f"\n{row.traceback.rstrip()}")
 
 
 @app.command("wait")
 def wait(job: Job, as_json: AsJson = False) -> None:
     """Wait until a job ends; exit code 1 unless it is done. Ctrl-C leaves the job running."""
     with connect() as service:
-        document = wait_for_job(service, job, quiet=as_json, cancel=False)
+        row = wait_for_job(service, job, quiet=as_json, cancel=False)
     if as_json:
-        print_json(document)
+        print_json(row.model_dump(mode="json"))
     else:
         out.print(f"Job {job} is done.")
 
@@ -76,8 +73,8 @@ def wait(job: Job, as_json: AsJson = False) -> None:
 def cancel(job: Job) -> None:
     """Cancel a job; finished parts are kept for the next attempt."""
     with connect() as service:
-        document = service.post(f"/jobs/{job}/cancel")
-    if document["finished_at"] is None:
+        row = read(JobRow, service.post(f"/jobs/{job}/cancel"))
+    if row.finished_at is None:
         out.print(f"Job {job} is being cancelled.")
     else:
-        out.print(f"Job {job} is {document['state']}.")
+        out.print(f"Job {job} is {row.state}.")

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.calibration.answer import ModelEffect
+from glovecal_service.cli.asking import verb
 from glovecal_service.cli.model.vendor_files import (
     VendorFormat,
     exported_calibration,
     imported_calibration,
     print_left_out,
 )
-from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.connection import connect, stored_models
 from glovecal_service.cli.terminal.options import (
     AsJson,
     Model,
@@ -25,16 +27,22 @@ from glovecal_service.cli.terminal.options import (
     subject_named,
 )
 from glovecal_service.cli.terminal.printing import (
+    Overwrite,
+    Refusal,
     err,
-    moment,
     out,
     print_facts,
     print_json,
     print_sentences,
     print_table,
+    read_or_print,
+    require_place,
+    write_whole,
 )
-from glovecal_service.cli.terminal.refusal import Refusal
-from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
+from glovecal_service.plain import read
+from glovecal_service.questions.calibration_report import CALIBRATION_REPORT
+from glovecal_service.rest.model.answer import ActivationView, ImportedModel, ModelInFull, Rotation
+from glovecal_service.rest.model.answer import Model as ModelRow
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -44,43 +52,63 @@ WhoseModel = typer.Option(
 )
 
 app = typer.Typer(help="Calibration models: versions, activation, export, import.", no_args_is_help=True)
+app.command("report")(verb(CALIBRATION_REPORT))
 
 
 @app.command("list")
 def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
     """List models, oldest first; the active one of each subject, layout and hand is marked."""
-    wanted = {"subject": subject, "layout": layout}
     with connect() as service:
-        rows = service.get("/models", {key: value for key, value in wanted.items() if value})
-    if as_json:
-        print_json(rows)
-        return
+        found = service.get("/models", {"subject": subject, "layout": layout})
+    rows = read_or_print(list[ModelRow], found, as_json)
     shown = [
-        {
-            **row,
-            "short": row["id"][:12],
-            "method": _method(row),
-            "errors": _errors(row),
-            "created_at": moment(row["created_at"]),
-        }
-        for row in rows
+        {**vars(row), "short": row.short, "method": _method(row), "errors": _errors(row)} for row in rows
     ]
     columns = {
         "short": "model",
         "subject": "subject",
         "layout": "layout",
-        **({"hand": "hand"} if any(row["hand"] for row in rows) else {}),
+        **({"hand": "hand"} if any(row.hand for row in rows) else {}),
+        **({"name": "name"} if any(row.name for row in rows) else {}),
         "method": "method",
         "errors": "error (°)",
         "active": "active",
         "created_at": "trained",
     }
     print_table(shown, columns, empty="No models yet. Train one: glovecal train --subject NAME")
-    if any(row["rmse_unseen_wearing_deg"] is not None for row in rows):
+    if any(row.rmse_unseen_wearing_deg is not None for row in rows):
         out.print("Errors: in a wearing not seen / in wearings seen.")
     for row in rows:
-        if row["damage"]:
-            err.print(f"Damaged and active: {row['damage']}", style="red")
+        if row.damage:
+            err.print(f"Damaged and active: {row.damage}", style="red")
+
+
+@app.command("name")
+def name(
+    model: Model,
+    text: Annotated[str, typer.Argument(help="What people call it; empty for nothing.")],
+    note: Annotated[str, typer.Option(help="What is to be remembered of it.")] = "",
+) -> None:
+    """Give a model a name and a note."""
+    with connect() as service:
+        row = read(ModelRow, service.put(f"/models/{model}/name", {"name": text, "note": note}))
+    out.print(f"Model {row.short} of {row.subject} is called {row.name}." if row.name else "It has no name.")
+
+
+@app.command("remove")
+def remove(model: Model) -> None:
+    """Leave a model out of lists. What was made of it stays; `model restore` undoes it."""
+    with connect() as service:
+        row = read(ModelRow, service.delete(f"/models/{model}"))
+    out.print(f"Removed model {row.short} of {row.subject}. To undo: glovecal model restore {row.short}")
+
+
+@app.command("restore")
+def restore(model: Model) -> None:
+    """Undo the removal of a model."""
+    with connect() as service:
+        row = read(ModelRow, service.post(f"/models/{model}/restore"))
+    out.print(f"Model {row.short} of {row.subject} is back; it is not active.")
 
 
 @app.command("show")
@@ -88,12 +116,13 @@ def show(model: Model, as_json: AsJson = False) -> None:
     """Show one model: errors of each rotation, effects, takes, lineage."""
     with connect() as service:
         document = service.get(f"/models/{model}")
-        lineage = service.get(f"/models/{document['id']}/lineage")
+        found = read(ModelInFull, document)
+        lineage = read(list[ModelRow], service.get(f"/models/{found.id}/lineage"))
     if as_json:
-        print_json({**document, "lineage": [row["id"] for row in lineage]})
+        print_json({**document, "lineage": [row.id for row in lineage]})
         return
-    print_facts(_facts(document, lineage))
-    print_sentences((document["unseen_wearing"] or {}).get("sentences", ()))
+    print_facts(_facts(found, lineage))
+    print_sentences(found.unseen_wearing.sentences if found.unseen_wearing else ())
     out.print()
     columns = {
         "rotation": "rotation",
@@ -104,51 +133,51 @@ def show(model: Model, as_json: AsJson = False) -> None:
         "samples": "samples",
         "sensors": "sensors",
     }
-    print_table(document["rotations"], columns, empty="No rotations.")
-    lines = line_rows(document["rotations"])
+    print_table(found.rotations, columns, empty="No rotations.")
+    lines = line_rows(found.rotations)
     if lines:
         out.print()
         out.print("Lines: angle = scale x reading + ... + offset")
         print_table(lines, LINE_COLUMNS, empty="")
-    tried = kernel_rows(document["rotations"])
+    tried = kernel_rows(found.rotations)
     if tried:
         out.print()
         out.print("Kernels tried: errors on takes left out, evidence over the first")
         print_table(tried, KERNEL_COLUMNS, empty="")
-        for row in document["rotations"]:
-            if row["kernel_choice"]:
-                err.print(row["kernel_choice"]["sentence"])
-    if document["effect_details"]:
+        for row in found.rotations:
+            if row.kernel_choice:
+                err.print(row.kernel_choice.sentence)
+    if found.effect_details:
         out.print()
-        print_table(effect_rows(document["effect_details"]), EFFECT_COLUMNS, empty="")
+        print_table(effect_rows(found.effect_details), EFFECT_COLUMNS, empty="")
 
 
-def _errors(row: dict[str, Any]) -> str | float | None:
+def _errors(row: ModelRow) -> str | float | None:
     """In a wearing not seen, then in those seen, where both are known."""
-    unseen, seen = row["rmse_unseen_wearing_deg"], row["held_out_rmse_deg"]
+    unseen, seen = row.rmse_unseen_wearing_deg, row.held_out_rmse_deg
     return seen if unseen is None or seen is None else f"{unseen:.2f} / {seen:.2f}"
 
 
-def _method(row: dict[str, Any]) -> str:
+def _method(row: ModelRow) -> str:
     """The regressors and the effects on top of them."""
-    effects = ", ".join(dict.fromkeys(row["effects"]))
-    return f"{row['method']} + {effects}" if effects else row["method"]
+    effects = ", ".join(dict.fromkeys(row.effects))
+    return f"{row.method} + {effects}" if effects else row.method
 
 
-def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str, Any]:
+def _facts(found: ModelInFull, lineage: list[ModelRow]) -> dict[str, Any]:
     return {
-        "model": document["id"],
-        "subject": document["subject"],
-        "layout": document["layout"],
-        "hand": document["hand"],
-        "method": document["method"],
-        "active": document["active"],
-        "error (°)": document["held_out_rmse_deg"],
-        "estimated on": document["error_estimate"].get("how"),
-        "trained on": [take["name"] for take in document["facts"].get("takes", [])],
-        "simulated": document["simulated"],
-        "trained": moment(document["created_at"]),
-        "made from": [row["id"][:12] for row in lineage[1:]],
+        "model": found.id,
+        "subject": found.subject,
+        "layout": found.layout,
+        "hand": found.hand,
+        "method": found.method,
+        "active": found.active,
+        "error (°)": found.held_out_rmse_deg,
+        "estimated on": found.error_estimate.get("how"),
+        "trained on": list(found.trained_on.values()),
+        "simulated": found.simulated,
+        "trained": found.created_at,
+        "made from": [row.short for row in lineage[1:]],
     }
 
 
@@ -156,8 +185,8 @@ def _facts(document: dict[str, Any], lineage: list[dict[str, Any]]) -> dict[str,
 def activate(model: Model) -> None:
     """Predict live with this model from the next frame on."""
     with connect() as service:
-        document = service.post(f"/models/{model}/activate")
-    out.print(f"Model {document['model'][:12]} is active for {document['subject']}, {document['layout']}.")
+        found = read(ActivationView, service.post(f"/models/{model}/activate"))
+    out.print(f"Model {found.model[:12]} is active for {found.subject}, {found.layout}.")
 
 
 @app.command("refine")
@@ -174,10 +203,10 @@ def refine(
     """
     with connect() as service:
         body = {"rotations": {rotation: {"scale": scale, "offset_deg": offset}}, "activate": activate}
-        child = service.post(f"/models/{model}/refine", body)
-    out.print(f"Model {child['id'][:12]} of {child['subject']}: {child['facts']['sentences'][0]}")
+        child = read(ModelRow, service.post(f"/models/{model}/refine", body))
+    out.print(f"Model {child.short} of {child.subject}: {child.sentences[0]}")
     if not activate:
-        out.print(f"  glovecal model activate {child['id'][:12]}")
+        out.print(f"  glovecal model activate {child.short}")
 
 
 @app.command("rollback")
@@ -185,13 +214,13 @@ def rollback(subject: Subject, layout: OnlyLayout = None, hand: OnlyHand = None)
     """Return to the model that was active before. Layout and hand are needed only if there are several."""
     with connect() as service:
         wanted = {"subject": subject, "layout": layout or _only_layout(service, subject), "hand": hand}
-        document = service.post("/models/rollback", wanted)
-    out.print(f"Model {document['model'][:12]} is active again for {subject}, {wanted['layout']}.")
+        found = read(ActivationView, service.post("/models/rollback", wanted))
+    out.print(f"Model {found.model[:12]} is active again for {subject}, {found.layout}.")
 
 
 def _only_layout(service: RestClient, subject: str) -> str:
     service.get(f"/subjects/{subject}")
-    layouts = sorted({row["layout"] for row in service.get("/models", {"subject": subject})})
+    layouts = sorted({row.layout for row in stored_models(service, subject=subject)})
     if len(layouts) > 1:
         raise Refusal(f"subject {subject} has models of {', '.join(layouts)}; choose one with --layout")
     if not layouts:
@@ -213,9 +242,9 @@ def export(
     require_place(file, overwrite=overwrite)
     if form is not None:
         with connect() as service:
-            text, left_out = exported_calibration(service, model, form)
-        write_whole({file: text.encode()})
-        print_left_out(left_out)
+            written = exported_calibration(service, model, form)
+        write_whole({file: written.text.encode()})
+        print_left_out(written.left_out)
         return
     with connect() as service:
         write_whole({file: service.download(f"/models/{model}/export")})
@@ -259,23 +288,16 @@ def import_model(
         raise typer.BadParameter("--format, --layout and --subject go together: whose, of which glove")
     with connect() as service:
         if form is not None and layout is not None and subject is not None:
-            found, left_out = imported_calibration(
-                service, file, form, layout, subject, create_subject=create_subject
-            )
-            print_left_out(left_out)
+            found = imported_calibration(service, file, form, layout, subject, create_subject=create_subject)
         else:
             found = service.import_model(file, subject=subject, create_subject=create_subject, id=id)
-    if as_json:
-        print_json(found)
+    imported = read_or_print(ImportedModel, found, as_json)
+    kept = imported.model
+    if not imported.is_new:
+        out.print(f"Model {kept.short} of {kept.subject} was here already.")
         return
-    model, short = found["model"], found["model"]["id"][:12]
-    if not found["is_new"]:
-        out.print(f"Model {short} of {model['subject']} was here already.")
-        return
-    out.print(
-        f"Model {short} of {model['subject']}, layout {model['layout']}, was imported. To predict live:"
-    )
-    out.print(f"  glovecal model activate {short}")
+    out.print(f"Model {kept.short} of {kept.subject}, layout {kept.layout}, was imported. To predict live:")
+    out.print(f"  glovecal model activate {kept.short}")
 
 
 def active_model(service: RestClient, subject: str | None, layout: str | None) -> str:
@@ -283,21 +305,20 @@ def active_model(service: RestClient, subject: str | None, layout: str | None) -
     hand."""
     if subject is None:
         raise typer.BadParameter("name a model, or a subject with --subject")
-    query = {"subject": subject} | ({"layout": layout} if layout else {})
-    active = [row for row in service.get("/models", query) if row["active"]]
-    layouts = sorted({row["layout"] for row in active})
+    active = [row for row in stored_models(service, subject=subject, layout=layout) if row.active]
+    layouts = sorted({row.layout for row in active})
     if len(layouts) > 1:
         raise Refusal(
             f"subject {subject} has active models of {', '.join(layouts)}; choose one with --layout"
         )
     if len(active) > 1:
-        each = " and ".join(f"{row['id'][:12]} of the {row['hand']} hand" for row in active)
+        each = " and ".join(f"{row.short} of the {row.hand} hand" for row in active)
         raise Refusal(
             f"subject {subject} has two gloves and two active models: {each}; name the one you mean"
         )
     if not active:
         raise Refusal(f"subject {subject} has no active model; train one: glovecal train --subject {subject}")
-    return active[0]["id"]
+    return active[0].id
 
 
 # A model's effects and the kernels that were tried, as rows of tables.
@@ -325,21 +346,18 @@ LINE_COLUMNS = {
     "scale": "scale (°/count)",
     "offset": "offset (°)",
 }
-SCALE = (("mean angle", "spread_deg"), ("straight line", "straight_line_deg"))
-"""What the candidates' errors are to be read against."""
 
 
-def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """From the ``effect_details`` of a model document."""
+def effect_rows(effects: Sequence[ModelEffect]) -> list[dict[str, Any]]:
     return [
         {
-            "effect": effect["effect"] if first else "",
+            "effect": effect.effect if first else "",
             "rotation": rotation,
-            "numbers": _numbers(effect["parameters"].get(rotation, {})),
-            "evidence": effect["evidence"] if first else "",
+            "numbers": _numbers(effect.parameters.get(rotation, {})),
+            "evidence": effect.evidence if first else "",
         }
         for effect in effects
-        for first, rotation in _marked(effect["rotations"])
+        for first, rotation in _marked(effect.rotations)
     ]
 
 
@@ -357,28 +375,29 @@ def _numbers(values: Mapping[str, float | None]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def kernel_rows(rotations: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row a candidate, after those of the scale."""
+def kernel_rows(rotations: Sequence[Rotation]) -> list[dict[str, Any]]:
+    """One row a candidate, after what their errors are to be read against."""
     rows: list[dict[str, Any]] = []
     for rotation in rotations:
-        found, name = rotation["kernel_choice"], {"rotation": rotation["rotation"]}
+        found, name = rotation.kernel_choice, {"rotation": rotation.rotation}
         if found is None:
             continue
-        rows += [{**name, "kernel": words, "held_out_rmse_deg": found[error]} for words, error in SCALE]
-        rows += [{**item, **name, "chosen": item["chosen"] or None} for item in found["candidates"]]
+        scale = {"mean angle": found.spread_deg, "straight line": found.straight_line_deg}
+        rows += [{**name, "kernel": words, "held_out_rmse_deg": error} for words, error in scale.items()]
+        rows += [{**vars(item), **name, "chosen": item.chosen or None} for item in found.candidates]
     return rows
 
 
-def line_rows(rotations: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def line_rows(rotations: Sequence[Rotation]) -> list[dict[str, Any]]:
     """One row for each reading of a linear rotation, the offset in its first."""
     return [
         {
-            "rotation": "" if place else rotation["rotation"],
+            "rotation": "" if place else rotation.rotation,
             "sensor": sensor,
             "scale": f"{scale:.4g}",
-            "offset": "" if place else f"{rotation['line']['offset_deg']:.1f}",
+            "offset": "" if place else f"{rotation.line.offset_deg:.1f}",
         }
         for rotation in rotations
-        if rotation["line"]
-        for place, (sensor, scale) in enumerate(rotation["line"]["scale_deg"].items())
+        if rotation.line
+        for place, (sensor, scale) in enumerate(rotation.line.scale_deg.items())
     ]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from glovecal_service.cli.terminal.printing import err
-from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.printing import Refusal, err
+from glovecal_service.plain import read
+from glovecal_service.rest.model.answer import CalibrationFile
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -23,8 +24,8 @@ VendorFormat = Annotated[
 
 def imported_calibration(
     service: RestClient, file: Path, form: FormatName, layout: str, subject: str, *, create_subject: bool
-) -> tuple[dict[str, Any], Mapping[str, str]]:
-    """What ``import_model`` answers, and why sensors of the file were left out. Raises Refusal."""
+) -> dict[str, Any]:
+    """What ``import_model`` answers; it is told what was left out and doubted. Raises Refusal."""
     try:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -33,13 +34,12 @@ def imported_calibration(
     answer = service.post("/models/calibrations", body | {"create_subject": create_subject})
     for sensor, doubt in answer.pop("doubts").items():
         err.print(f"{sensor}: {doubt}.", style="yellow")
-    return answer, answer.pop("left_out")
+    print_left_out(answer.pop("left_out"))
+    return answer
 
 
-def exported_calibration(service: RestClient, model: str, form: FormatName) -> tuple[str, Mapping[str, str]]:
-    """The file's text, and why rotations were left out."""
-    written = service.get(f"/models/{model}/calibration", {"format": form})
-    return written["text"], written["left_out"]
+def exported_calibration(service: RestClient, model: str, form: FormatName) -> CalibrationFile:
+    return read(CalibrationFile, service.get(f"/models/{model}/calibration", {"format": form}))
 
 
 def print_left_out(left_out: Mapping[str, str]) -> None:

@@ -9,7 +9,8 @@ import typer
 from glovecal_service.cli.model.models import active_model
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, model_id
-from glovecal_service.cli.terminal.printing import out, print_json, print_table
+from glovecal_service.cli.terminal.printing import out, print_table, read_or_print
+from glovecal_service.rest.sampling.answer import NextStepsView, ProposedStepView
 
 COLUMNS = {
     "name": "step",
@@ -37,27 +38,24 @@ def next_steps(
     """
     with connect() as service:
         chosen = model or active_model(service, subject, layout)
-        found = service.get(f"/models/{chosen}/next-steps", {"most": most})
-    if as_json:
-        print_json(found)
-        return
-    print_table([_row(step, found) for step in found["steps"]], COLUMNS, empty="")
-    for sentence in found["sentences"]:
+        document = service.get(f"/models/{chosen}/next-steps", {"most": most})
+    found = read_or_print(NextStepsView, document, as_json)
+    print_table([_row(step, found.rms_sd_deg) for step in found.steps], COLUMNS, empty="")
+    for sentence in found.sentences:
         out.print(sentence)
-    if found["diagnosed"] is not None:
-        wanted = found["diagnosed"]
-        out.print(f"Also useful, {wanted['seconds']:g} s: {wanted['what']} {wanted['reason']}")
+    wanted = found.diagnosed
+    if wanted is not None:
+        out.print(f"Also useful, {wanted.seconds:g} s: {wanted.what} {wanted.reason}")
 
 
-def _row(step: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
-    falls = sorted(
-        step["sd_after_deg"], key=lambda rotation: step["sd_after_deg"][rotation] - step["sd_deg"][rotation]
-    )
-    told = [f"{name} {step['sd_deg'][name]:.1f} to {step['sd_after_deg'][name]:.1f}" for name in falls]
+def _row(step: ProposedStepView, rms_sd_deg: float) -> dict[str, Any]:
+    before, after = step.sd_deg, step.sd_after_deg
+    falls = sorted(after, key=lambda rotation: after[rotation] - before[rotation])
+    told = [f"{name} {before[name]:.1f} to {after[name]:.1f}" for name in falls]
     return {
-        "name": step["name"],
-        "needs": step["needs"],
-        "seconds": f"{step['seconds']:.1f}",
+        "name": step.name,
+        "needs": step.needs,
+        "seconds": f"{step.seconds:.1f}",
         "teaches": ", ".join(told[:MOST_TAUGHT]) + (" ..." if len(told) > MOST_TAUGHT else ""),
-        "all": f"{found['rms_sd_deg']:.2f} to {step['rms_sd_after_deg']:.2f}",
+        "all": f"{rms_sd_deg:.2f} to {step.rms_sd_after_deg:.2f}",
     }

@@ -17,15 +17,16 @@ from glovecal_client.errors import ServiceError
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
-from glovecal_models.sampling.catalogue import PROTOCOLS
-from glovecal_models.sampling.order import Order
+from glovecal_models.sampling.catalogue import PROTOCOLS, Order
 from glovecal_models.sampling.state import TRIGGERS
 from glovecal_service.cli.sampling.next_steps import next_steps
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import JOB_ID, AsJson, identifier, subject_named
-from glovecal_service.cli.terminal.printing import err, moment, out, print_json, print_table
-from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.printing import Refusal, err, out, print_json, print_table, read_or_print
 from glovecal_service.operating_system import single_keys
+from glovecal_service.plain import read
+from glovecal_service.rest.sampling.answer import SamplingView
+from glovecal_service.rest.take.answer import Take
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -80,16 +81,12 @@ def sample(
             raise typer.BadParameter(f"give --{what}")
     check_identifier(glove, "glove")
     wanted: dict[str, Any] = {"glove": glove, "subject": subject, "protocol": protocol, "trigger": trigger}
-    wanted |= {"order": order, "seed": seed}
-    wanted["widget_deg"] = _widget_angles(widget or [])
-    wanted["pose_deg"] = _pose_angles(poses)
-    if rod:
-        wanted["rod_mm"] = rod
-    if wearing is not None:
-        wanted["wearing"] = wearing
+    wanted |= {"order": order, "seed": seed, "pose_deg": _pose_angles(poses)}
+    wanted |= {"widget_deg": _widget_angles(widget or [])} | ({"rod_mm": rod} if rod else {})
+    wanted |= {} if wearing is None else {"wearing": wearing}
     _require_keyboard(trigger)
     with connect() as service:
-        _lead(service, service.post("/sampling", wanted), as_json)
+        _lead(service, read(SamplingView, service.post("/sampling", wanted)), as_json)
 
 
 @app.command("list")
@@ -101,25 +98,18 @@ def list_samplings(
 ) -> None:
     """Show samplings, newest first."""
     with connect() as service:
-        found = service.get("/sampling", None if glove is None else {"glove": glove})
-    if as_json:
-        print_json(found)
-        return
+        found = service.get("/sampling", {"glove": glove})
+    views = read_or_print(list[SamplingView], found, as_json)
     rows = [
         {
-            "id": view["id"],
-            "glove": view["glove"],
-            "subject": view["subject"],
-            "protocol": view["protocol"],
-            "phase": view["phase"],
-            "done": f"{sum(step['outcome'] == 'good' for step in view['steps'])} of {len(view['steps'])}",
-            "takes": len(view["takes"]),
-            "began": moment(view["created_at"]),
+            **vars(view),
+            "done": f"{sum(step.outcome == 'good' for step in view.steps)} of {len(view.steps)}",
+            "takes": len(view.takes),
         }
-        for view in found
+        for view in views
     ]
     headings = {"id": "id", "glove": "glove", "subject": "subject", "protocol": "protocol", "phase": "phase"}
-    more = {"done": "steps done", "takes": "takes", "began": "started"}
+    more = {"done": "steps done", "takes": "takes", "created_at": "started"}
     print_table(
         rows, headings | more, empty="No sampling yet. Start one: glovecal sample --glove NAME --subject NAME"
     )
@@ -135,12 +125,12 @@ def resume(
 ) -> None:
     """Continue an interrupted sampling."""
     with connect() as service:
-        view = service.get(f"/sampling/{sampling}")
-        if not view["open"]:
-            raise Refusal(f"sampling {sampling} is {view['phase']}; its takes are stored")
-        _require_keyboard(view["trigger"])
-        if view["phase"] == "paused":
-            view = service.post(f"/sampling/{sampling}/resume")
+        view = read(SamplingView, service.get(f"/sampling/{sampling}"))
+        if not view.open:
+            raise Refusal(f"sampling {sampling} is {view.phase}; its takes are stored")
+        _require_keyboard(view.trigger)
+        if view.phase == "paused":
+            view = read(SamplingView, service.post(f"/sampling/{sampling}/resume"))
         _lead(service, view, as_json)
 
 
@@ -149,30 +139,29 @@ def _require_keyboard(trigger: str) -> None:
         raise Refusal("there is no terminal to read keys from; use --trigger timer or --trigger still")
 
 
-def _lead(service: RestClient, view: dict[str, Any], as_json: bool) -> None:
+def _lead(service: RestClient, view: SamplingView, as_json: bool) -> None:
     view = walk(service, view, quiet=as_json)
     if as_json:
-        print_json(view)
+        print_json(view.model_dump(mode="json"))
         return
-    if view["open"]:
-        out.print(f"Interrupted. Continue with: glovecal sample resume {view['id']}")
+    if view.open:
+        out.print(f"Interrupted. Continue with: glovecal sample resume {view.id}")
         return
-    bad = [step for step in view["steps"] if step["outcome"] != "good"]
+    bad = [step for step in view.steps if step.outcome != "good"]
     for step in bad:
-        out.print(f"{step['name']}: {step['outcome'] or 'not done'}. {' '.join(step['reasons'])}".rstrip())
-    for sentence in (*view["sentences"], view["problem"]):
+        out.print(f"{step.name}: {step.outcome or 'not done'}. {' '.join(step.reasons)}".rstrip())
+    for sentence in (*view.sentences, view.problem):
         if sentence:
             out.print(sentence)
     out.print(
-        f"{len(view['takes'])} takes of {len(view['steps']) - len(bad)} steps; "
-        f"{view['capture_s']:.0f} s of capture."
+        f"{len(view.takes)} takes of {len(view.steps) - len(bad)} steps; {view.capture_s:.0f} s of capture."
     )
-    if view["takes"] and view["protocol"] != "second_wearing":
-        hand = service.get(f"/takes/{view['takes'][0]}")["known_hand"]
-        out.print(f"Next: glovecal train --subject {view['subject']}" + (f" --hand {hand}" if hand else ""))
-    elif view["takes"]:
-        named = " ".join(f"--take {take}" for take in view["takes"])
-        out.print(f"Next: glovecal quick-check --subject {view['subject']} {named} --activate")
+    if view.takes and view.protocol != "second_wearing":
+        hand = read(Take, service.get(f"/takes/{view.takes[0]}")).known_hand
+        out.print(f"Next: glovecal train --subject {view.subject}" + (f" --hand {hand}" if hand else ""))
+    elif view.takes:
+        named = " ".join(f"--take {take}" for take in view.takes)
+        out.print(f"Next: glovecal quick-check --subject {view.subject} {named} --activate")
 
 
 def _widget_angles(told: Sequence[str]) -> dict[str, list[float]]:
@@ -209,60 +198,60 @@ KEYS = {" ": "go", "r": "redo", "u": "undo", "s": "skip", "q": "pause"}
 HELP = "space: start   r: repeat   u: undo   s: skip   q: pause"
 
 
-def walk(service: RestClient, view: dict[str, Any], *, quiet: bool = False) -> dict[str, Any]:
+def walk(service: RestClient, view: SamplingView, *, quiet: bool = False) -> SamplingView:
     """Follow the sampling to its end, or until the user pauses; the last view of it."""
-    path, said = f"/sampling/{view['id']}", 0
+    path, said = f"/sampling/{view.id}", 0
     shown = Live(console=out, auto_refresh=False, transient=True) if out.is_terminal and not quiet else None
     with shown or nullcontext(), single_keys() as key:
         try:
-            while view["phase"] not in ("done", "stopped", "paused"):
-                if view["say_number"] > said and not quiet:
-                    out.print(view["say"])
-                said = max(said, view["say_number"])
+            while view.phase not in ("done", "stopped", "paused"):
+                if view.say_number > said and not quiet:
+                    out.print(view.say)
+                said = max(said, view.say_number)
                 if shown is not None:
                     shown.update(_picture(view), refresh=True)
                 event = KEYS.get(key(LOOK_EVERY_S))
-                view = service.get(path) if event is None else _send(service, path, event)
+                view = read(SamplingView, service.get(path)) if event is None else _send(service, path, event)
         except KeyboardInterrupt:
-            return service.post(f"{path}/pause")
+            return read(SamplingView, service.post(f"{path}/pause"))
     if not quiet:
-        out.print(view["say"])
-    return view if view["phase"] == "paused" else _with_takes(service, path)
+        out.print(view.say)
+    return view if view.phase == "paused" else _with_takes(service, path)
 
 
-def _send(service: RestClient, path: str, event: str) -> dict[str, Any]:
+def _send(service: RestClient, path: str, event: str) -> SamplingView:
     try:
-        return service.post(f"{path}/{event}")
+        return read(SamplingView, service.post(f"{path}/{event}"))
     except ServiceError as error:
         if error.status != 409:
             raise
         err.print(error.detail)
-        return service.get(path)
+        return read(SamplingView, service.get(path))
 
 
-def _with_takes(service: RestClient, path: str) -> dict[str, Any]:
+def _with_takes(service: RestClient, path: str) -> SamplingView:
     until = time.monotonic() + TAKES_WITHIN_S
-    while (view := service.get(path))["open"] and time.monotonic() < until:
+    while (view := read(SamplingView, service.get(path))).open and time.monotonic() < until:
         time.sleep(LOOK_EVERY_S)
     return view
 
 
-def _picture(view: dict[str, Any]) -> Text:
-    step = view["step"] or {"place": 0, "name": ""}
-    spent = f"{view['capture_s']:.0f} of about {view['capture_of_s']:.0f} s"
-    line = f"[{step['place']}/{len(view['steps'])}] {step['name']}: {view['phase']}{_left(view)}   {spent}\n"
-    return Text(f"{line}{_steadiness(view)}\n{view['problem'] or HELP}")
+def _picture(view: SamplingView) -> Text:
+    place, name = (view.step.place, view.step.name) if view.step else (0, "")
+    spent = f"{view.capture_s:.0f} of about {view.capture_of_s:.0f} s"
+    line = f"[{place}/{len(view.steps)}] {name}: {view.phase}{_left(view)}   {spent}\n"
+    return Text(f"{line}{_steadiness(view)}\n{view.problem or HELP}")
 
 
-def _left(view: dict[str, Any]) -> str:
-    if view["phase_of_s"] is None:
+def _left(view: SamplingView) -> str:
+    if view.phase_of_s is None:
         return ""
-    return f" {max(0.0, view['phase_of_s'] - view['phase_s']):.1f} s"
+    return f" {max(0.0, view.phase_of_s - view.phase_s):.1f} s"
 
 
-def _steadiness(view: dict[str, Any]) -> str:
+def _steadiness(view: SamplingView) -> str:
     """The bar is full at four times what is still."""
-    percent, still = view["steadiness_percent"], view["still_percent"]
+    percent, still = view.steadiness_percent, view.still_percent
     if percent is None:
         return "no frames yet"
     blocks = min(BAR, round(BAR * percent / (4 * still)))

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
-from glovecal_models.hand.handedness import HANDS, Handedness
+from glovecal_models.hand.rotations import HANDS, Handedness
 from glovecal_models.hand.skeleton import Palm
-from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.take.rows import stored_takes
+from glovecal_service.cli.terminal.connection import connect, stored_models
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
-from glovecal_service.cli.terminal.printing import moment, out, print_facts, print_json, print_table, text
-from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.printing import (
+    Refusal,
+    out,
+    print_facts,
+    print_table,
+    read_or_print,
+    text,
+)
+from glovecal_service.plain import read
+from glovecal_service.rest.subject.answer import HistoryView, SkeletonView
+from glovecal_service.rest.subject.answer import Subject as SubjectRow
+from glovecal_service.rest.take.answer import Take
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -83,9 +94,10 @@ def measure(
     measured = measured_dimensions(hand_length_mm, dimensions)
     with connect() as service:
         if not measured:
-            measured = service.get(f"/subjects/{name}")["dimensions"]
-        kept = service.put(f"/subjects/{name}/hand", {"dimensions": measured, "hand": hand})
-    which = "hand unknown" if kept["hand"] == "unknown" else f"{kept['hand']} hand"
+            measured = read(SubjectRow, service.get(f"/subjects/{name}")).dimensions
+        body = {"dimensions": measured, "hand": hand}
+        kept = read(SubjectRow, service.put(f"/subjects/{name}/hand", body))
+    which = "hand unknown" if kept.hand == "unknown" else f"{kept.hand} hand"
     out.print(f"Subject {name}: {which}, {text(measured)} mm." if measured else f"Subject {name}: {which}.")
 
 
@@ -93,13 +105,11 @@ def measure(
 def history(name: Name, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
     """Show calibrations and quick checks in order of time: errors as found, as left, and what is due."""
     with connect() as service:
-        found = service.get(f"/subjects/{name}/history", {"layout": layout} if layout else None)
-    if as_json:
-        print_json(found)
-        return
-    rows = [{**row, "short": row["model"][:12], "made_at": moment(row["made_at"])} for row in found["rows"]]
+        document = service.get(f"/subjects/{name}/history", {"layout": layout})
+    found = read_or_print(HistoryView, document, as_json)
+    rows = [{**vars(row), "short": row.model[:12]} for row in found.rows]
     print_table(rows, HISTORY, empty=f"No models yet. Train one: glovecal train --subject {name}")
-    for sentence in found["sentences"]:
+    for sentence in found.sentences:
         out.print(sentence)
 
 
@@ -114,14 +124,11 @@ def skeleton(
 ) -> None:
     """Show the sizes of a subject's hand; --json prints joints, axes and limits for a viewer."""
     with connect() as service:
-        query = {"palm": palm} | ({"hand": hand} if hand is not None else {})
-        document = service.get(f"/subjects/{name}/skeleton", query)
-    if as_json:
-        print_json(document)
-        return
-    sizes, measured = document["dimensions"]["sizes"], document["dimensions"]["measured"]
+        document = service.get(f"/subjects/{name}/skeleton", {"palm": palm, "hand": hand})
+    found = read_or_print(SkeletonView, document, as_json)
+    sizes, measured = found.dimensions.sizes, found.dimensions.measured
     rows = [{"name": key, "mm": f"{mm:.1f}", "from": _origin(key, measured)} for key, mm in sizes.items()]
-    print_table(rows, {"name": f"{document['hand']} hand", "mm": "mm", "from": ""}, empty="")
+    print_table(rows, {"name": f"{found.hand} hand", "mm": "mm", "from": ""}, empty="")
 
 
 def _origin(dimension: str, measured: list[str]) -> str:
@@ -134,11 +141,9 @@ def _origin(dimension: str, measured: list[str]) -> str:
 def list_subjects(as_json: AsJson = False) -> None:
     """List all subjects."""
     with connect() as service:
-        rows = service.get("/subjects")
-    if as_json:
-        print_json(rows)
-        return
-    rows = [{**row, "title": row["title"] or None, "created_at": moment(row["created_at"])} for row in rows]
+        found = service.get("/subjects")
+    rows = read_or_print(list[SubjectRow], found, as_json)
+    rows = [{**vars(row), "title": row.title or None} for row in rows]
     columns = {"name": "subject", "title": "name", "created_at": "added"}
     print_table(rows, columns, empty="No subjects yet. Add one: glovecal subject add NAME")
 
@@ -148,32 +153,30 @@ def show(name: Name, as_json: AsJson = False) -> None:
     """Show one subject: takes, models and the active model."""
     with connect() as service:
         document = service.get(f"/subjects/{name}")
-        if as_json:
-            print_json(document)
-            return
-        takes = service.get("/takes", {"subject": name})
-        models = service.get("/models", {"subject": name})
+        takes = stored_takes(service, subject=name)
+        models = stored_models(service, subject=name)
+    found = read_or_print(SubjectRow, document, as_json)
     print_facts(
         {
             "subject": name,
-            "name": document["title"] or None,
-            "hand": " and ".join(_hands(document, takes)) or "unknown",
-            "measured (mm)": document["dimensions"],
-            "added": moment(document["created_at"]),
+            "name": found.title or None,
+            "hand": " and ".join(_hands(found, takes)) or "unknown",
+            "measured (mm)": found.dimensions,
+            "added": found.created_at,
             "takes": len(takes),
             "models": len(models),
             "active": [
-                f"{row['id'][:12]} ({', '.join(filter(None, (row['method'], row['layout'], row['hand'])))})"
+                f"{row.short} ({', '.join(filter(None, (row.method, row.layout, row.hand)))})"
                 for row in models
-                if row["active"]
+                if row.active
             ],
         }
     )
 
 
-def _hands(subject: dict[str, Any], takes: list[dict[str, Any]]) -> list[str]:
+def _hands(subject: SubjectRow, takes: list[Take]) -> list[str]:
     """Those that the subject is said to have, and those whose gloves recorded its takes."""
-    return [hand for hand in HANDS if hand in (subject["hand"], *(row["known_hand"] for row in takes))]
+    return [hand for hand in HANDS if hand in (subject.hand, *(row.known_hand for row in takes))]
 
 
 @app.command("remove")
@@ -193,14 +196,14 @@ def remove(
 
 def _remove_takes(service: RestClient, subject: str) -> None:
     """All or none: takes that a model was trained on stay, so a subject with models keeps all."""
-    models = service.get("/models", {"subject": subject})
+    models = stored_models(service, subject=subject)
     if models:
         raise Refusal(
             f"subject {subject} has {len(models)} models, which need the takes they were trained on"
         )
-    for row in service.get("/takes", {"subject": subject}):
-        service.delete(f"/takes/{row['id']}")
-        out.print(f"Removed take {row['name']} ({row['id']}).")
+    for row in stored_takes(service, subject=subject):
+        service.delete(f"/takes/{row.id}")
+        out.print(f"Removed take {row.name} ({row.id}).")
 
 
 def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str, float]:
@@ -214,7 +217,7 @@ def measured_dimensions(length_mm: float | None, file: Path | None) -> dict[str,
         if wrong:
             raise BadInput(f"{wrong[0]} is {measured[wrong[0]]!r}; give a number of mm")
         if length_mm is not None:
-            measured["hand_length"] = length_mm
+            measured |= {"hand_length": length_mm}
         HandDimensions.from_measured(measured)
     except BadInput as error:
         raise Refusal(f"{file}: {error}" if file is not None else str(error)) from error

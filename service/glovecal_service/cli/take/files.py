@@ -7,12 +7,15 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from glovecal_client.errors import ServiceError
-from glovecal_models.takes.take_warnings import kind_of
-from glovecal_service.cli.terminal.printing import err
-from glovecal_service.cli.terminal.refusal import Refusal, exit_code_of, sentence_of
+from glovecal_models.takes.take_check import kind_of
+from glovecal_service.cli.take.rows import stored_takes
+from glovecal_service.cli.terminal.connection import subject_names
+from glovecal_service.cli.terminal.printing import Refusal, err, exit_code_of, sentence_of
+from glovecal_service.plain import read
+from glovecal_service.rest.take.answer import ImportedTakes, Take
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -43,10 +46,10 @@ class FileSubject:
     ) -> FileSubject:
         """``subject``, else whoever has one of the files already, else a new one named after the first."""
         hashes = [_sha256(file) for file in files]
-        rows = [] if subject is not None else service.get("/takes")
-        owners: list[str] = [row["subject"] for row in rows if row["original_sha256"] in hashes]
+        rows = [] if subject is not None else stored_takes(service)
+        owners = [row.subject for row in rows if row.original_sha256 in hashes]
         name = subject or next(iter(owners), PREFIX + hashes[0][:8])
-        if name not in {row["name"] for row in service.get("/subjects")}:
+        if name not in subject_names(service):
             service.post("/subjects", {"name": name, "title": f"Takes of {files[0].name}"})
             if subject is not None:
                 err.print(added_subject(service, subject), style="yellow")
@@ -57,14 +60,14 @@ class FileSubject:
         warnings = ImportWarnings()
         rows = [row for file in frames_among(files) for row in self._imported(file, warnings)]
         warnings.print()
-        return [row["id"] for row in rows]
+        return [row.id for row in rows]
 
-    def _imported(self, file: Path, warnings: ImportWarnings) -> list[dict[str, Any]]:
+    def _imported(self, file: Path, warnings: ImportWarnings) -> list[Take]:
         from glovecal_models.takes.table import reference_beside
 
         self._require_layout(file)
         try:
-            answer = self.service.upload_takes(
+            document = self.service.upload_takes(
                 file,
                 subject=self.name,
                 layout=self.layout,
@@ -75,16 +78,17 @@ class FileSubject:
             if exit_code_of(error) != 1:
                 raise
             raise Refusal(f"{file}: {sentence_of(error)}") from error
-        self.layout = answer["layout"]
-        warnings.add(file, answer["warnings"])
-        return answer["takes"]
+        answer = read(ImportedTakes, document)
+        self.layout = answer.layout
+        warnings.add(file, answer.warnings)
+        return answer.takes
 
     def _require_layout(self, file: Path) -> None:
         digest = _sha256(file)
-        for row in self.service.get("/takes", {"subject": self.name}):
-            if row["original_sha256"] == digest and self.layout not in (None, row["layout"]):
+        for row in stored_takes(self.service, subject=self.name):
+            if row.original_sha256 == digest and self.layout not in (None, row.layout):
                 raise Refusal(
-                    f"{file} was imported before with layout {row['layout']}, not {self.layout}; give that "
+                    f"{file} was imported before with layout {row.layout}, not {self.layout}; give that "
                     "one, or set GLOVECAL_DATA to another folder"
                 )
 
@@ -99,7 +103,7 @@ def _sha256(file: Path) -> str:
 
 def added_subject(service: RestClient, subject: str) -> str:
     """What to say of a subject that a file's import added, so that a mistyped name is seen and undone."""
-    others = [row["name"] for row in service.get("/subjects") if row["name"] != subject]
+    others = [name for name in subject_names(service) if name != subject]
     near = difflib.get_close_matches(subject, others, n=3)
     similar = f" Similar: {', '.join(near)}." if near else ""
     return f"Added subject {subject}.{similar} To undo: glovecal subject remove {subject} --takes"

@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.take.rows import find_take
+from glovecal_service.cli.take.rows import find_take, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
-from glovecal_service.cli.terminal.printing import out, print_json
+from glovecal_service.cli.terminal.printing import out, read_or_print
+from glovecal_service.rest.take.answer import HandAlignmentView
 
 
 def hands(
@@ -23,10 +24,7 @@ def hands(
     "glovecal take motion" joins two takes by the same.
     """
     with connect() as service:
-        rows = service.get("/takes")
-        wanted = [find_take(rows, name)["id"] for name in (first, second)]
+        rows = stored_takes(service)
+        wanted = [find_take(rows, name).id for name in (first, second)]
         found = service.post("/takes/hands", {"takes": wanted, "claps": claps})
-    if as_json:
-        print_json(found)
-    else:
-        out.print(found["sentence"])
+    out.print(read_or_print(HandAlignmentView, found, as_json).sentence)

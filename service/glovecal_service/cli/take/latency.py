@@ -14,8 +14,7 @@ from glovecal_client.errors import NoAnswer
 from glovecal_service.cli.glove.heard_frames import heard_frames, times_and_readings
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import DEFAULT_ZENOH, AsJson, Glove, Site, Zenoh
-from glovecal_service.cli.terminal.printing import err, out, print_json
-from glovecal_service.cli.terminal.refusal import NobodyThere, Refusal
+from glovecal_service.cli.terminal.printing import NobodyThere, Refusal, err, out, print_json
 from glovecal_service.operating_system import single_keys
 
 if TYPE_CHECKING:
@@ -120,8 +119,7 @@ def _is_number(text: str) -> bool:
 def _live(glove: str, taps: int, endpoint: str, site: str) -> Times:
     """Raises Refusal, NobodyThere."""
     from glovecal_client.keys import GloveKeys
-    from glovecal_client.queries import ask_json
-    from glovecal_client.session import open_client
+    from glovecal_client.session import ask_json, open_client
 
     wire = GloveKeys(site, glove)
     try:

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal, get_args
 
 import typer
 
-from glovecal_models.hand.handedness import Handedness
-from glovecal_service.cli.take.rows import find_take
+from glovecal_models.hand.rotations import Handedness
+from glovecal_service.cli.take.rows import find_take, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id
-from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
+from glovecal_service.cli.terminal.printing import Overwrite, require_place, write_whole
 
 MOST_HANDS = 2
 
@@ -85,9 +85,9 @@ def motion(
         raise typer.BadParameter(f"{len(take)} takes are too many: one, or one of each hand")
     require_place(file, overwrite=overwrite)
     with connect() as service:
-        rows = service.get("/takes")
+        rows = stored_takes(service)
         asked: dict[str, Any] = {
-            "takes": [find_take(rows, name)["id"] for name in take],
+            "takes": [find_take(rows, name).id for name in take],
             "models": model or [],
             "hands": hand or [],
             "content": content,
@@ -99,6 +99,5 @@ def motion(
         }
         if body is not None:
             markers = {"right": _names(right), "left": _names(left)}
-            body_of = {"upload": service.upload(body), "shift_s": body_shift, **markers}
-            asked["body"] = body_of
+            asked |= {"body": {"upload": service.upload(body), "shift_s": body_shift, **markers}}
         write_whole({file: service.made("/motion", asked)})

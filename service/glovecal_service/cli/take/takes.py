@@ -9,17 +9,29 @@ import typer
 
 from glovecal_client.errors import ServiceError
 from glovecal_service.cli.take import clocks, examination, hands, holds, latency, motion, table_import, video
-from glovecal_service.cli.take.rows import find_take, find_takes, print_takes
+from glovecal_service.cli.take.rows import find_take, find_takes, print_takes, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
-from glovecal_service.cli.terminal.printing import err, moment, out, print_facts, print_json, print_table
-from glovecal_service.cli.terminal.writing import Overwrite, require_place, write_whole
+from glovecal_service.cli.terminal.printing import (
+    Overwrite,
+    err,
+    out,
+    print_facts,
+    print_table,
+    read_or_print,
+    require_place,
+    write_whole,
+)
+from glovecal_service.plain import read
+from glovecal_service.rest.take.answer import CameraReferenceView, CheckView
+from glovecal_service.rest.take.answer import Take as TakeRow
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 app = typer.Typer(help="Takes: recordings with or without reference angles.", no_args_is_help=True)
 app.command("import")(table_import.import_takes)
+app.command("look")(table_import.look)
 app.command("clocks")(clocks.clocks)
 app.command("latency")(latency.latency)
 app.command("examine")(examination.examine)
@@ -34,7 +46,7 @@ JUMPS = {
     "end_s": "to (s)",
     "rows": "rows",
     "size_deg": "by (deg)",
-    "excluded": "excluded",
+    "comes_back": "excluded",
 }
 CONFLICT = 409
 """The service's answer when a take is two tables."""
@@ -44,12 +56,9 @@ FORMATS = (".csv", ".parquet")
 @app.command("list")
 def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
     """List takes, oldest first."""
-    wanted = {"subject": subject, "layout": layout}
     with connect() as service:
-        rows = service.get("/takes", {key: value for key, value in wanted.items() if value})
-    if as_json:
-        print_json(rows)
-        return
+        found = service.get("/takes", {"subject": subject, "layout": layout})
+    rows = read_or_print(list[TakeRow], found, as_json)
     print_takes(rows, empty="No takes yet. Import some: glovecal take import FILE --subject NAME")
 
 
@@ -57,14 +66,12 @@ def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: 
 def check(take: Take, as_json: AsJson = False) -> None:
     """Show one take: how long, how regular, what was measured, what looks wrong."""
     with connect() as service:
-        found = service.get(f"/takes/{_id(service, take)}/check")
-    if as_json:
-        print_json(found)
-        return
+        document = service.get(f"/takes/{_id(service, take)}/check")
+    found = read_or_print(CheckView, document, as_json)
     print_facts(_facts(found))
     out.print()
     sensors = {"sensor": "sensor", "low": "lowest", "high": "highest", "changed": "changes"}
-    print_table(found["sensors"], sensors, empty="No sensors.")
+    print_table(found.sensors, sensors, empty="No sensors.")
     out.print()
     rotations = {
         "rotation": "rotation",
@@ -72,38 +79,33 @@ def check(take: Take, as_json: AsJson = False) -> None:
         "high_deg": "highest (deg)",
         "rows": "rows",
     }
-    print_table(
-        found["rotations"], rotations, empty="No reference angles: nothing to train on or compare with."
-    )
-    if found["jumps"]:
+    print_table(found.rotations, rotations, empty="No reference angles: nothing to train on or compare with.")
+    if found.jumps:
         out.print()
-        jumps = [{**item, "excluded": item["comes_back"]} for item in found["jumps"]]
-        print_table(jumps, JUMPS, empty="")
-    for sentence in found["sentences"]:
+        print_table(found.jumps, JUMPS, empty="")
+    for sentence in found.sentences:
         err.print(sentence, style="yellow")
 
 
-def _facts(found: dict[str, Any]) -> dict[str, Any]:
-    take = found["take"]
-    gaps = f"{found['gaps']}, longest interval {found['longest_interval_s'] or 0:.3g} s"
-    accounting, pre_roll_s = take["accounting"] or {}, found["pre_roll_s"]
+def _facts(found: CheckView) -> dict[str, Any]:
+    take, pre_roll_s, sent = found.take, found.pre_roll_s, found.take.sent
     return {
-        "take": f"{take['id']} {take['name']}",
-        "subject": take["subject"],
-        "layout": take["layout"],
-        "wearing": take["wearing"],
-        "simulated": take["simulated"],
-        "source": take["source"],
-        "added": moment(take["created_at"]),
-        "frames": f"{take['frames']} in {take['duration_s']:.2f} s",
-        **({"pre-roll": f"{found['pre_roll_frames']} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
-        "state": take["state"],
-        **({"frames sent": accounting["sent"]} if "sent" in accounting else {}),
-        "rate (Hz)": found["rate_hz"],
-        "gaps": gaps,
-        "repeated frames": f"{100 * found['repeated_frames']:.0f} %",
-        "with reference": f"{100 * found['frames_with_reference']:.0f} % of the frames",
-        "context": take["context"],
+        "take": f"{take.id} {take.name}",
+        "subject": take.subject,
+        "layout": take.layout,
+        "wearing": take.wearing,
+        "simulated": take.simulated,
+        "source": take.source,
+        "added": take.created_at,
+        "frames": f"{take.frames} in {take.duration_s:.2f} s",
+        **({"pre-roll": f"{found.pre_roll_frames} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
+        "state": take.state,
+        **({} if sent is None else {"frames sent": sent}),
+        "rate (Hz)": found.rate_hz,
+        "gaps": f"{found.gaps}, longest interval {found.longest_interval_s or 0:.3g} s",
+        "repeated frames": f"{100 * found.repeated_frames:.0f} %",
+        "with reference": f"{100 * found.frames_with_reference:.0f} % of the frames",
+        "context": take.context,
     }
 
 
@@ -120,13 +122,13 @@ def reference(
 ) -> None:
     """Attach reference angles that were measured elsewhere to a recorded take."""
     with connect() as service:
-        document = service.attach_reference(_id(service, take), file, clock=clock)
-        found = service.get(f"/takes/{document['id']}/check")
+        kept = read(TakeRow, service.attach_reference(_id(service, take), file, clock=clock))
+        found = read(CheckView, service.get(f"/takes/{kept.id}/check"))
     out.print(
-        f"Take {document['name']} now has {document['reference_rows']} reference rows; "
-        f"{100 * found['frames_with_reference']:.0f} % of its frames have a reference."
+        f"Take {kept.name} now has {kept.reference_rows} reference rows; "
+        f"{100 * found.frames_with_reference:.0f} % of its frames have a reference."
     )
-    for sentence in found["sentences"]:
+    for sentence in found.sentences:
         err.print(sentence, style="yellow")
 
 
@@ -146,10 +148,7 @@ def camera(
     """Attach what a camera measured while the glove recorded as the take's reference."""
     with connect() as service:
         answer = service.attach_camera_reference(_id(service, take), file, near_s=near, within_s=within)
-    if as_json:
-        print_json(answer)
-        return
-    for sentence in answer["sentences"]:
+    for sentence in read_or_print(CameraReferenceView, answer, as_json).sentences:
         out.print(sentence)
 
 
@@ -196,23 +195,21 @@ def use_layout(
     if not take and subject is None:
         raise typer.BadParameter("say which: TAKE ..., or all takes of a subject with --subject")
     with connect() as service:
-        rows = service.get("/takes", {"subject": subject} if subject else {})
+        rows = stored_takes(service, subject=subject)
         wanted = find_takes(rows, take) if take else rows
         for row in wanted:
-            service.put(f"/takes/{row['id']}/layout", {"layout": layout})
-    out.print(
-        f"Read by layout {layout} from now on: {', '.join(row['name'] for row in wanted) or 'no take'}."
-    )
+            service.put(f"/takes/{row.id}/layout", {"layout": layout})
+    out.print(f"Read by layout {layout} from now on: {', '.join(row.name for row in wanted) or 'no take'}.")
 
 
 @app.command("remove")
 def remove(take: Take) -> None:
     """Remove a take that no model was trained on. The file it came from stays in the data folder."""
     with connect() as service:
-        row = find_take(service.get("/takes"), take)
-        service.delete(f"/takes/{row['id']}")
-    out.print(f"Removed take {row['name']} ({row['id']}).")
+        row = find_take(stored_takes(service), take)
+        service.delete(f"/takes/{row.id}")
+    out.print(f"Removed take {row.name} ({row.id}).")
 
 
 def _id(service: RestClient, take: str) -> str:
-    return find_take(service.get("/takes"), take)["id"]
+    return find_take(stored_takes(service), take).id

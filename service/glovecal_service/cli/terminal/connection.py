@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from glovecal_client.private_files import PRIVATE_FOLDER, keep_private
 from glovecal_models.errors import BadInput
-from glovecal_service.cli.terminal.printing import err
-from glovecal_service.cli.terminal.refusal import Refusal, sentence_of
+from glovecal_service.cli.terminal.printing import Refusal, err, sentence_of
+from glovecal_service.plain import read
+from glovecal_service.rest.model.answer import Model
+from glovecal_service.rest.subject.answer import Subject
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -48,6 +50,16 @@ def connect() -> Iterator[RestClient]:
     _require_usable(settings)
     with in_process_client(settings) as client, _warnings_told(client):
         yield client
+
+
+def stored_models(service: RestClient, **query: str | None) -> list[Model]:
+    """``query``: subject, layout and hand, each or None."""
+    return read(list[Model], service.get("/models", query))
+
+
+def subject_names(service: RestClient) -> list[str]:
+    """Of all there are."""
+    return [row.name for row in read(list[Subject], service.get("/subjects"))]
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.names import check_identifier, subject_name
 from glovecal_service.cli.terminal.printing import err
 

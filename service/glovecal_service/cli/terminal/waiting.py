@@ -12,9 +12,10 @@ from rich.text import Text
 
 from glovecal_client.errors import ServiceError
 from glovecal_models.progress import Report
-from glovecal_service.cli.terminal.printing import err
-from glovecal_service.cli.terminal.refusal import Refusal
+from glovecal_service.cli.terminal.printing import Refusal, err
 from glovecal_service.jobs.time_left import TimeLeft
+from glovecal_service.plain import read
+from glovecal_service.rest.job.answer import Job, JobFacts
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -24,24 +25,27 @@ BAR_WIDTH, TEXT_WIDTH = 12, 44
 """Text, bar, percentage and time fit into 80 columns."""
 
 
-def wait_for_job(
-    service: RestClient, job: str, *, quiet: bool = False, cancel: bool = True
-) -> dict[str, Any]:
+def begun_job(document: dict[str, Any]) -> str:
+    """Its id, of what REST answers where a job is begun."""
+    return read(JobFacts, document).id
+
+
+def wait_for_job(service: RestClient, job: str, *, quiet: bool = False, cancel: bool = True) -> Job:
     """The finished job. Raises Refusal when it failed; Ctrl-C cancels it, if ``cancel``, and raises on."""
     with _bar(quiet) as progress:
         bar = progress.add_task("waiting for a worker", total=1.0)
 
         def show(document: dict[str, Any]) -> None:
-            sentence = document["sentence"] or "waiting for a worker"
+            now = read(Job, document)
             progress.update(
                 bar,
-                completed=document["fraction"],
-                description=_short(sentence),
-                left=document["detail"].get("seconds_left"),
+                completed=now.fraction,
+                description=_short(now.sentence or "waiting for a worker"),
+                left=now.detail.get("seconds_left"),
             )
 
         try:
-            return service.wait_for_job(job, progress=show)
+            return read(Job, service.wait_for_job(job, progress=show))
         except (KeyboardInterrupt, SystemExit):
             if cancel:
                 service.post(f"/jobs/{job}/cancel")

@@ -1,1 +1,1 @@
-"""Physical effects: ``/v1/effects``, and diagnosis, changes and improvement of models."""
+"""Physical effects: ``/v1/effects``, one of them on trial, and its picture."""

@@ -8,13 +8,15 @@ from pydantic import Field
 
 from glovecal_models.comparison.effect_picture import effect_picture
 from glovecal_models.comparison.noise_floor import noise_floors
-from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.plain import plain
+from glovecal_service.questions.chosen_takes import TakesNamed
+from glovecal_service.questions.declarations import AskedEffect, asked_effect
+from glovecal_service.request_types import Channel, StrictBody
+from glovecal_service.rest.effect.answer import EffectPictureView, PictureSeriesView
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody
-from glovecal_service.rest.model.compared_takes import compared_takes
-from glovecal_service.rest.model.model_takes import TakesNamed
-from glovecal_service.views.effect_picture import EffectPictureView, effect_picture_view
+from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.http.request_types import ModelInPath
+from glovecal_service.rest.model.comparison import compared_takes
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -43,11 +45,14 @@ def picture_of_effect(id: ModelInPath, body: PictureRequest, parts: PartsNeeded)
     measured = on.found.measured_rotations
     errors = np.sqrt(np.nanmean(on.found.stacked("error") ** 2, axis=0))
     rotation = body.rotation or max(measured, key=lambda name: errors[on.found.column(name)])
-    return effect_picture_view(
-        effect_picture(on.found, effect, rotation),
-        on.model.id,
-        effect.name,
-        effect.shown_over,
-        rotations=measured,
+    picture = dict(vars(effect_picture(on.found, effect, rotation)))
+    series = [PictureSeriesView(**plain(vars(one))) for one in picture.pop("series")]
+    return EffectPictureView(
+        **picture,
+        series=series,
+        model=on.model.id,
+        effect=effect.name,
+        shown_over=effect.about.shown_over,
+        rotations=list(measured),
         floor=noise_floors(on.found).get(rotation),
     )

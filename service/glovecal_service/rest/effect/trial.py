@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from glovecal_models.diagnosis.text import candidate
+from glovecal_models.diagnosis.trial.answer import TriedEffect
 from glovecal_models.effects.catalogue import DeclaredEffect
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel
-from glovecal_service.jobs.effect_trial import EffectTrial
-from glovecal_service.jobs.effect_trial import try_effect as judge_effect
-from glovecal_service.jobs.model_work import is_short
-from glovecal_service.rest.effect.declarations import AskedEffect, asked_effect, declaration_document
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.questions.chosen_takes import TakesNamed, model_takes
+from glovecal_service.questions.declarations import AskedEffect, asked_effect, declaration_document
+from glovecal_service.questions.effect_trial import EffectTrial
+from glovecal_service.questions.effect_trial import try_effect as judge_effect
+from glovecal_service.questions.model_work import is_short
+from glovecal_service.request_types import StrictBody
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
-from glovecal_service.rest.http.request_types import ModelInPath, StrictBody
-from glovecal_service.rest.model.model_takes import TakesNamed, model_takes
-from glovecal_service.views.diagnosis import CandidateView
+from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.http.request_types import ModelInPath
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -31,33 +33,26 @@ class TrialRequest(StrictBody):
     takes: TakesNamed | None = Field(None, description="Ids or names; null: those it was trained on.")
 
 
-class TrialView(BaseModel):
-    model: str
-    effect: str
-    explanation: str
-    takes: list[str] = Field(description="Their ids; each is left out once.")
-    judged: CandidateView | None = Field(description="Null: these takes cannot show it.")
-    not_identifiable: str | None = Field(description="Why these takes cannot show it.")
-
-
 @router.post(
     "/{id}/try-effect",
-    response_model=TrialView,
+    response_model=TriedEffect,
     summary="What one effect would save on left-out takes",
     responses=change_problems(409),
 )
-async def try_effect(id: ModelInPath, body: TrialRequest, request: Request, parts: PartsNeeded) -> TrialView:
+async def try_effect(
+    id: ModelInPath, body: TrialRequest, request: Request, parts: PartsNeeded
+) -> TriedEffect:
     """As a diagnosis judges it, alone and in seconds: nothing is stored. 422 for an expression that cannot be
     read, for one that has no value in some frame, and for one that takes longer than a minute.
     """
 
-    def compute(cancelled: Cancel) -> TrialView:
+    def compute(cancelled: Cancel) -> TriedEffect:
         return _tried(id, body, parts, cancelled)
 
     return await in_time(request, parts, compute, limit_s=LIMIT_S, what="this trial")
 
 
-def _tried(id: str, body: TrialRequest, parts: Parts, cancelled: Cancel) -> TrialView:
+def _tried(id: str, body: TrialRequest, parts: Parts, cancelled: Cancel) -> TriedEffect:
     record = parts.store.models.get(id)
     model, _ = parts.predictors.get(record.id)
     rows = model_takes(parts.store, record, body.takes)
@@ -71,11 +66,11 @@ def _tried(id: str, body: TrialRequest, parts: Parts, cancelled: Cancel) -> Tria
         found = judge_effect(trial)
     else:
         found = in_process(judge_effect, trial, "this trial", cancelled)
-    return TrialView(
+    return TriedEffect(
         model=record.id,
         effect=effect.name,
-        explanation=effect.explanation,
+        explanation=effect.about.explanation,
         takes=[row.id for row in rows],
-        judged=None if found.judged is None else CandidateView.of(found.judged),
+        judged=None if found.judged is None else candidate(found.judged),
         not_identifiable=found.not_identifiable,
     )

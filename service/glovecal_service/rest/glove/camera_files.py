@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from glovecal_service.camera.camera_files import CameraFiles, Kind
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.camera.camera_settings import CameraFiles, Kind
+from glovecal_service.request_types import Sha256, StrictBody
+from glovecal_service.rest.glove.answer import CameraFileNames
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.request_types import NameInPath, Sha256, StrictBody
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import NameInPath
 from glovecal_service.store.errors import NotFound
 
 router = APIRouter(prefix="/camera-files", tags=["cameras"])
-
-
-class CameraFileNames(BaseModel):
-    colours: list[str] = Field(description="Made by `glovecal camera colours`.")
-    calibrations: list[str] = Field(description="Made by `glovecal camera calibrate`.")
 
 
 class NewCameraFile(StrictBody):

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
 from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
-from glovecal_client.queries import json_object
-from glovecal_service.camera.camera_files import CameraFiles
-from glovecal_service.camera.camera_settings import CameraSettings
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_client.session import json_object
+from glovecal_service.camera.camera_settings import CameraFiles, CameraSettings
+from glovecal_service.camera.started_cameras import StartedCamera
+from glovecal_service.request_types import Identifier, StrictBody, SubjectName
+from glovecal_service.rest.glove.answer import CameraHealthView, CameraView, Kept, Stage
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.request_types import Identifier, NameInPath, StrictBody, SubjectName
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import NameInPath
 from glovecal_service.store.errors import Conflict, NotFound
-from glovecal_service.views.cameras import CameraView, Kept, Stage, said_of_itself, silent
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
 
@@ -79,7 +81,7 @@ def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
         entries=body.entries, clips=body.clips,
         sizes_mm={} if worn_by is None else worn_by.dimensions,
     )  # fmt: skip
-    return silent(parts.cameras.started.start(asked))
+    return _silent(parts.cameras.started.start(asked))
 
 
 @router.get("", response_model=list[CameraView], summary="Cameras", responses=problems())
@@ -99,7 +101,7 @@ def stop_camera(glove: NameInPath, parts: PartsNeeded) -> CameraView:
     camera = _camera(parts, glove)
     ended = parts.cameras.started.stop(glove)
     if ended is not None:
-        return silent(ended)
+        return _silent(ended)
     _command(parts, glove, "stop", "")
     return camera.model_copy(update={"state": "stopped", "sentence": "stopped", "health": None})
 
@@ -162,7 +164,7 @@ def get_picture(
 
 def _cameras(parts: Parts) -> dict[str, CameraView]:
     started = parts.cameras.started.states()
-    found = {glove: silent(camera) for glove, camera in started.items()}
+    found = {glove: _silent(camera) for glove, camera in started.items()}
     try:
         samples = parts.cameras.ask(all_gloves(parts.settings.site, "status"))
     except NoAnswer:
@@ -177,6 +179,28 @@ def _cameras(parts: Parts) -> dict[str, CameraView]:
         if view is not None:
             found[glove] = view
     return found
+
+
+def said_of_itself(glove: str, status: Mapping[str, Any], *, started_here: bool) -> CameraView | None:
+    """None for what is no camera's status."""
+    if not isinstance(status.get("camera"), dict):
+        return None
+    try:
+        health = CameraHealthView.model_validate(status["camera"])
+        published = {name: status.get(name) for name in ("state", "sentence")}
+        own = {"glove": glove, "source": health.source, "is_simulated": health.simulated, "health": health}
+        return CameraView.model_validate(published | own | {"started_here": started_here})
+    except ValidationError:
+        return None
+
+
+def _silent(camera: StartedCamera) -> CameraView:
+    """One that was started here and does not answer: it begins, or has ended."""
+    return CameraView(
+        glove=camera.glove, source=camera.source, state="opening" if camera.is_on else "stopped",
+        sentence=camera.sentence or ("starting" if camera.is_on else "stopped"),
+        is_simulated=camera.source == "rendered", started_here=True, health=None,
+    )  # fmt: skip
 
 
 def _camera(parts: Parts, glove: str) -> CameraView:

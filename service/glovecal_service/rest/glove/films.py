@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.errors import BadInput
 from glovecal_service.filming import FilmState
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.request_types import Id, StrictBody
+from glovecal_service.rest.glove.answer import Film
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import Id, StrictBody
+from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.take.videos import attach_preview
 from glovecal_service.store.errors import Conflict
 
@@ -19,22 +20,6 @@ router = APIRouter(prefix="/films", tags=["recordings"])
 
 MOST_TAKES = 16
 Source = Annotated[str, Field(pattern=r"^(camera:[0-9]{1,2}|rendered)$")]
-
-
-class Film(BaseModel):
-    source: str
-    file: str = Field(description="In the folder `films` of the data folder: lossless, with time stamps.")
-    is_on: bool
-    pictures: int
-    problem: str = Field(description="Why it ended early; empty where it did not.")
-    sentences: list[str] = Field(default_factory=list, description="Beside which takes it is shown.")
-
-    @classmethod
-    def of(cls, state: FilmState, sentences: list[str] | None = None) -> Film:
-        return cls(
-            source=state.source, file=state.file.name, is_on=state.is_on, pictures=state.pictures,
-            problem=state.problem, sentences=sentences or [],
-        )  # fmt: skip
 
 
 class NewFilm(StrictBody):
@@ -52,14 +37,14 @@ class FilmedTakes(StrictBody):
 )
 def start_film(body: NewFilm, parts: PartsNeeded) -> Film:
     """Answers once the first picture is there; 422 with what the camera says, 409 while another is filmed."""
-    return Film.of(parts.filming.start(body.source))
+    return _film(parts.filming.start(body.source))
 
 
 @router.get("", response_model=Film | None, summary="The last video", responses=problems())
 def get_film(parts: PartsNeeded) -> Film | None:
     """Null before the first."""
     state = parts.filming.state()
-    return None if state is None else Film.of(state)
+    return None if state is None else _film(state)
 
 
 @router.post("/stop", response_model=Film, summary="End the video", responses=change_problems(409))
@@ -77,4 +62,11 @@ def stop_film(body: FilmedTakes, parts: PartsNeeded) -> Film:
                 sentences.append(f"{take.name}: {error}")
     finally:
         preview.unlink()
-    return Film.of(state, sentences)
+    return _film(state, sentences)
+
+
+def _film(state: FilmState, sentences: list[str] | None = None) -> Film:
+    return Film(
+        source=state.source, file=state.file.name, is_on=state.is_on, pictures=state.pictures,
+        problem=state.problem, sentences=sentences or [],
+    )  # fmt: skip

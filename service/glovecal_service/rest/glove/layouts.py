@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, Field, FiniteFloat, StringConstraints, ValidationError
+from pydantic import Field, FiniteFloat, StringConstraints, ValidationError
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.layout import MOST_NAMES, Layout
-from glovecal_models.takes.tap_latency import FEWEST_TAPS
-from glovecal_service.rest.http.answers import change_problems, problems
-from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import (
+from glovecal_service.request_types import (
     ONE_LINE,
     Channel,
     Identifier,
-    NameInPath,
     StrictBody,
     SubjectName,
     Title,
     WearingName,
 )
-from glovecal_service.store.clock import now
+from glovecal_service.rest.glove.answer import Gloves, GloveView, Latency, LayoutView
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.problem import Problem, change_problems, problems
+from glovecal_service.rest.http.request_types import NameInPath
+from glovecal_service.store.database import now
 from glovecal_service.store.layouts import no_layout
 from glovecal_service.store.records import GloveRecord, LayoutRecord
 
@@ -57,57 +55,15 @@ class LayoutBody(StrictBody):
     also: Channels | None = None
 
 
-class LayoutView(BaseModel):
-    name: str
-    title: str
-    sensors: list[str]
-    rotations: list[str]
-    document: dict[str, Any] = Field(description="As in a layout file, every rotation spelled out.")
-    built_in: bool
-    created_at: datetime | None
-
-
-class Latency(StrictBody):
-    """What ``glovecal take latency`` measured."""
-
-    latency_s: Annotated[FiniteFloat, Field(ge=-0.1, le=1.0)]
-    sd_s: Annotated[FiniteFloat, Field(ge=0, le=0.1, description="Standard deviation of `latency_s`.")]
-    taps: Annotated[int, Field(ge=FEWEST_TAPS, le=100_000)]
-    used: Annotated[int, Field(ge=FEWEST_TAPS, le=100_000, description="Taps that were alike.")]
-    key_latency_s: Annotated[FiniteFloat, Field(ge=0, le=0.2, description="Taken for the key's own.")] = 0.0
-
-
-class LatencyView(Latency):
-    measured_at: str = Field(description="ISO 8601.")
-
-
-class GloveView(BaseModel):
-    name: str
-    layout: str | None
-    subject: str | None
-    wearing: str | None
-    hand: str
-    simulated: bool
-    meta: dict[str, Any]
-    first_seen_at: datetime
-    last_seen_at: datetime
-    assigned_at: datetime | None
-    latency: LatencyView | None = Field(None, description="How late it is, as taps on a key showed.")
-
-
-class Gloves(BaseModel):
-    layouts: list[LayoutView]
-    seen: list[GloveView]
-
-
 class Wearer(StrictBody):
     subject: SubjectName | None = Field(description="None: nobody.")
     wearing: WearingName | None = None
 
 
 @router.get("", response_model=Gloves, summary="Layouts, and gloves seen", responses=problems())
-def list_gloves(store: StoreNeeded) -> dict[str, Any]:
-    return {"layouts": [_view(record) for record in store.layouts.list()], "seen": store.gloves.list()}
+def list_gloves(store: StoreNeeded) -> Gloves:
+    seen = [GloveView.model_validate(record, from_attributes=True) for record in store.gloves.list()]
+    return Gloves(layouts=[_view(record) for record in store.layouts.list()], seen=seen)
 
 
 @router.get("/{layout}", response_model=LayoutView, summary="One layout", responses=problems())
@@ -179,13 +135,7 @@ def forget_latency(glove: NameInPath, store: StoreNeeded) -> GloveRecord:
 def _view(record: LayoutRecord) -> LayoutView:
     layout = Layout.from_document(record.document)
     return LayoutView(
-        name=record.name,
-        title=layout.title,
-        sensors=list(layout.sensors),
-        rotations=list(layout.rotations),
-        document=record.document,
-        built_in=record.built_in,
-        created_at=record.created_at,
+        **vars(record), title=layout.title, sensors=list(layout.sensors), rotations=list(layout.rotations)
     )
 
 

@@ -3,46 +3,27 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any, Literal
+from typing import Any
 
 import zenoh
 from fastapi import APIRouter
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import ValidationError
 
 from glovecal_client.errors import BadName, NoAnswer
 from glovecal_client.keys import all_gloves, parse_glove_key
-from glovecal_client.queries import ask, json_object
-from glovecal_client.session import open_client
+from glovecal_client.session import ask, json_object, open_client
 from glovecal_service.realtime.service_status import all_service_statuses
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.rest.glove.answer import LiveGlove
 from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.problem import change_problems
 from glovecal_service.store.errors import Conflict
-from glovecal_service.views.warm_up import warm_up_left_s
 
 router = APIRouter(prefix="/live-gloves", tags=["gloves"])
 
 WITHIN_S = 1.0
-
-
-class Warning(BaseModel):
-    """Something that is wrong, noticed within 10 s of motion."""
-
-    part: str = Field(description='"wearer": wrong person, hand or model; "sensor": dead or stuck.')
-    sentence: str
-    advice: str
-
-
-class LiveGlove(BaseModel):
-    glove: str
-    state: Literal["calibrated", "uncalibrated"] | None
-    subject: str | None
-    wearing: str | None
-    layout: str | None
-    model: str | None
-    sentence: str | None = Field(description="Why it is not served better, such as by a wrong hand.")
-    warnings: list[Warning]
-    on_for_s: float | None = Field(description="Since capture began; null where it does not answer.")
-    warm_up_left_s: float | None = Field(description="Of 20 minutes; 0 for a warm glove.")
+WARM_UP_S = 1200.0
+"""Of a CyberGlove III (Krnoul et al. 2016, section 4): no figure is known of others. Capture tells since when
+it hears the glove, not since when that is on."""
 
 
 @router.get("", response_model=list[LiveGlove], summary="Gloves now", responses=change_problems(409))
@@ -74,7 +55,7 @@ def _as_said(glove: str, said: Any, on_for_s: float | None) -> LiveGlove | None:
             glove=glove,
             warnings=said.get("warnings", []),
             on_for_s=on_for_s,
-            warm_up_left_s=None if on_for_s is None else warm_up_left_s(on_for_s),
+            warm_up_left_s=None if on_for_s is None else max(0.0, WARM_UP_S - on_for_s),
             **{name: said.get(name) for name in names},
         )
     except ValidationError:

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from glovecal_service.rest.http.answers import change_problems, problems
-from glovecal_service.rest.http.damaged_rows import without_damaged
+from glovecal_service.request_types import IDENTIFIER, Identifier, StrictBody, SubjectName, WearingName
+from glovecal_service.rest.glove.answer import Recording
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.request_types import (
-    IDENTIFIER,
-    Identifier,
-    IdInPath,
-    StrictBody,
-    SubjectName,
-    WearingName,
-)
+from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
+from glovecal_service.rest.http.request_types import IdInPath
 from glovecal_service.store.recordings import LONGEST_PRE_ROLL_S, PRE_ROLL_S
-from glovecal_service.store.records import RecordingRecord, RecordingState
+from glovecal_service.store.records import RecordingRecord
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
 
@@ -37,20 +30,6 @@ class NewRecording(StrictBody):
         description="Seconds before the request that are fetched from the capture log, as far as they lie in "
         "the same run and wearing: they tell effects with a memory where they stand.",
     )
-
-
-class Recording(BaseModel):
-    id: str
-    glove: str
-    name: str
-    subject: str | None
-    wearing: str | None
-    state: RecordingState
-    facts: dict[str, Any] = Field(
-        description="`sent`, `recorded`, `repaired`, `missing`, `pending`, `pre_roll`, `take`, `sentence` ..."
-    )
-    requested_at: datetime
-    updated_at: datetime
 
 
 @router.post(

@@ -25,8 +25,8 @@ from glovecal_models.errors import (
 )
 from glovecal_models.names import did_you_mean
 from glovecal_service.plain import plain_text
+from glovecal_service.request_types import LONGEST_SHOWN, MEANING
 from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import LONGEST_SHOWN, MEANING
 from glovecal_service.store.errors import Conflict, NotFound, StorageFull, StoreDamaged, StoreUnavailable
 
 MOST_FIELD_PROBLEMS = 20

@@ -1,16 +1,21 @@
-"""What every error looks like on the wire: a problem document (RFC 9457)."""
+"""What every error looks like on the wire: a problem document (RFC 9457), named in OpenAPI by each operation.
+
+Lists go on without damaged rows; each of those is named in a ``Warning`` header of the answer.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
-from typing import Any
+from typing import Any, TypeVar
 
+from fastapi import FastAPI, Response
+from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.responses import Response
 
 from glovecal_service.plain import plain, plain_text
+from glovecal_service.store.errors import DamagedRows
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -79,3 +84,84 @@ class Problem(Exception):
             media_type=MEDIA_TYPE,
             headers={"Cache-Control": "no-store", **self.headers},
         )
+
+
+Record = TypeVar("Record")
+MOST_WARNINGS = 20
+LONGEST_WARNING = 400
+
+
+def without_damaged(response: Response, read: Callable[[], list[Record]]) -> list[Record]:
+    """What ``read`` gives, or of damaged rows the sound ones, with the others named in the answer."""
+    try:
+        return read()
+    except DamagedRows as error:
+        for sentence in error.damaged[:MOST_WARNINGS]:
+            warn(response, sentence)
+        return error.sound
+
+
+def warn(response: Response, sentence: str) -> None:
+    """A header ``Warning: 299 glovecal "..."`` (RFC 7234, section 5.5: a persistent warning)."""
+    quoted = plain_text(sentence, LONGEST_WARNING).encode("ascii", "backslashreplace").decode()
+    quoted = quoted.replace("\\", "\\\\").replace('"', '\\"')
+    response.headers.append("Warning", f'299 glovecal "{quoted}"')
+
+
+_MEANING = {
+    403: "A page of another site asked for a change.",
+    404: "There is no such thing (or the path is not a plain name).",
+    408: "The body came too slowly.",
+    409: "It contradicts what is stored.",
+    413: "The body is too large.",
+    415: "The body is of a type this does not read.",
+    421: "The Host header names another computer.",
+    422: "The request cannot be used; `errors` or `file`, `line`, `column` say where.",
+    500: "A stored file is damaged, or the service failed; details are in its log under `request_id`.",
+    503: "The database does not answer, or the service is not ready.",
+    507: "The disk is full; nothing was kept.",
+}
+_ANYWHERE = (404, 421, 422, 500, 503)
+_CHANGING = (403, 408, 413, 507)
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """``responses=`` of an operation that only reads: the usual problems and ``statuses``."""
+    return {status: _documented(status) for status in sorted({*_ANYWHERE, *statuses})}
+
+
+def change_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """``responses=`` of an operation that changes something or has a body."""
+    return problems(*_CHANGING, *statuses)
+
+
+def install_openapi(app: FastAPI, *bodies: type[BaseModel]) -> None:
+    """Add the components that are referred to by hand: ``Problem``, and ``bodies`` that are read by hand."""
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            schema = get_openapi(
+                title=app.title,
+                version=app.version,
+                description=app.description,
+                routes=app.routes,
+                tags=app.openapi_tags,
+            )
+            schemas = schema.setdefault("components", {}).setdefault("schemas", {})
+            models: dict[str, type[BaseModel]] = {"Problem": ProblemDocument}
+            models |= {body.__name__: body for body in bodies}
+            for name, model in models.items():
+                component = model.model_json_schema(ref_template="#/components/schemas/{model}")
+                schemas.update(component.pop("$defs", {}))
+                schemas[name] = component
+            for unused in ("HTTPValidationError", "ValidationError"):
+                schemas.pop(unused, None)
+            app.openapi_schema = schema
+        return app.openapi_schema
+
+    app.openapi = openapi
+
+
+def _documented(status: int) -> dict[str, Any]:
+    reference = {"$ref": "#/components/schemas/Problem"}
+    return {"description": _MEANING[status], "content": {MEDIA_TYPE: {"schema": reference}}}

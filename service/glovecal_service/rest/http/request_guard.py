@@ -1,16 +1,23 @@
-"""Requests that no router should see: hostile paths, and pages of other sites using the user's browser.
+"""Requests that no router should see: hostile paths, pages of other sites, bodies too large or too slow.
 
 Without logins the browser is the way in: any page can make it send requests to 127.0.0.1, and a host
 name that an attacker points at 127.0.0.1 (DNS rebinding) makes such a page same-origin. So, while bound
 to loopback, only loopback names are answered, and a changing request of another origin is refused.
+
+Neither Starlette nor uvicorn bounds the time of a body (trust.md 2.4: 200 half-sent requests still open
+after 12 s), so its bytes and its time are bounded here, below the framework: the body is counted as it
+passes, and an answer the application tries to give after a bound was broken is replaced by 413 or 408.
 """
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
+import time
+from collections.abc import Callable
 from urllib.parse import urlsplit
 
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from glovecal_service.rest.http.problem import Problem
 
@@ -92,3 +99,146 @@ def _same_origin(headers: dict[bytes, str], host: str) -> bool:
         return urlsplit(origin).netloc.lower() == host.lower()
     except ValueError:
         return False
+
+
+LINGER_S = 2.0
+"""After a refusal the rest of the body is thrown away for this long, so that a client that is still
+sending reads the answer instead of a reset connection."""
+
+
+class BodyGuard:
+    """ASGI middleware: 413 above ``limit(path)`` bytes, 408 when the body is late.
+
+    A body may take ``patience_s`` in all, plus one second per ``slowest_bytes_per_s`` received: a large
+    upload over a slow line is fine, one byte now and then is not (Apache's mod_reqtimeout, MinRate).
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        limit: Callable[[str], int],
+        patience_s: float = 30.0,
+        slowest_bytes_per_s: float = 64e3,
+    ) -> None:
+        self.app = app
+        self.limit = limit
+        self.patience_s = patience_s
+        self.slowest_bytes_per_s = slowest_bytes_per_s
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        body = _Body(receive, self.limit(scope["path"]), self.patience_s, self.slowest_bytes_per_s)
+        declared = _content_length(scope)
+        if declared is not None and declared > body.limit:
+            await _refuse(body.too_large(), scope, receive, send)
+            return
+        answer = _Answer(send, body)
+        try:
+            await self.app(scope, body.receive, answer.send)
+        except Exception:
+            if body.broken is None or answer.started:
+                raise
+        if body.broken is not None and not answer.started:
+            await _refuse(body.broken, scope, receive, send)
+
+
+class _Body:
+    """The request body on its way in, counted and timed."""
+
+    def __init__(self, receive: Receive, limit: int, patience_s: float, slowest_bytes_per_s: float) -> None:
+        self._receive = receive
+        self._slowest = slowest_bytes_per_s
+        self._patience_s = patience_s
+        self._since = time.monotonic()
+        self._complete = False
+        self.limit = limit
+        self.received = 0
+        self.broken: Problem | None = None
+
+    async def receive(self) -> Message:
+        if self.broken is not None:
+            return {"type": "http.disconnect"}
+        if self._complete:
+            return await self._receive()
+        try:
+            async with asyncio.timeout(self._seconds_left()):
+                message = await self._receive()
+        except TimeoutError:
+            return self._stop(self.too_slow())
+        self.received += len(message.get("body", b""))
+        self._complete = not message.get("more_body", False)
+        return self._stop(self.too_large()) if self.received > self.limit else message
+
+    def _seconds_left(self) -> float:
+        allowed = self._patience_s + self.received / self._slowest
+        return max(0.0, self._since + allowed - time.monotonic())
+
+    def _stop(self, problem: Problem) -> Message:
+        self.broken = problem
+        return {"type": "http.disconnect"}
+
+    def too_large(self) -> Problem:
+        return Problem(
+            413,
+            "body-too-large",
+            f"The body is larger than the {_size(self.limit)} allowed here; nothing was kept.",
+            limit_bytes=self.limit,
+            headers={"Connection": "close"},
+        )
+
+    def too_slow(self) -> Problem:
+        return Problem(
+            408,
+            "body-too-slow",
+            f"Only {self.received} bytes of the body came in {self._patience_s:g} s; nothing was kept.",
+            headers={"Connection": "close"},
+        )
+
+
+class _Answer:
+    """Holds back whatever the application says after its body was cut off."""
+
+    def __init__(self, send: Send, body: _Body) -> None:
+        self._send = send
+        self._body = body
+        self.started = False
+
+    async def send(self, message: Message) -> None:
+        if self._body.broken is not None and not self.started:
+            return
+        self.started = True
+        await self._send(message)
+
+
+def _content_length(scope: Scope) -> int | None:
+    for name, value in scope["headers"]:
+        if name == b"content-length":
+            return int(value) if value.isdigit() and len(value) < 20 else None
+    return None
+
+
+async def _refuse(problem: Problem, scope: Scope, receive: Receive, send: Send) -> None:
+    response = problem.response(scope.get("state", {}).get("request_id"))
+    await send({"type": "http.response.start", "status": problem.status, "headers": response.raw_headers})
+    await send({"type": "http.response.body", "body": response.body, "more_body": True})
+    if problem.status == 413:
+        await _throw_away(receive)
+    await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+async def _throw_away(receive: Receive) -> None:
+    try:
+        async with asyncio.timeout(LINGER_S):
+            while True:
+                message = await receive()
+                if message["type"] == "http.disconnect" or not message.get("more_body", False):
+                    return
+    except TimeoutError:
+        return
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:g} MB" if count >= 1e6 else f"{count / 1e3:g} kB"

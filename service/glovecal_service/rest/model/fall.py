@@ -3,46 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from fastapi import APIRouter
 
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import Method
 from glovecal_models.comparison.noise_floor import takes_noise
 from glovecal_models.errors import NotTrainable
-from glovecal_models.takes.take import Take
-from glovecal_service.jobs.model_work import trained_ids
-from glovecal_service.report.fall_steps import (
-    Fall,
-    FloorBand,
-    fall_sentence,
+from glovecal_models.improvement.fall.answer import ErrorFall, FallStep, FloorBand
+from glovecal_models.improvement.fall.lineage import (
+    SIMPLER,
     lineage_falls,
+    simpler_calibrations,
     version_label,
     with_control,
 )
-from glovecal_service.rest.http.answers import problems
+from glovecal_models.presentation.document import TakeNamed
+from glovecal_models.takes.take import Take
+from glovecal_service.questions.model_work import leave_out_folds, settings_of, trained_ids
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.problem import problems
 from glovecal_service.rest.http.request_types import ModelInPath
 from glovecal_service.store.records import ModelRecord, TakeRecord
-from glovecal_service.views.diagnosis import TakeNamed
-from glovecal_service.views.fall import FallStepView, FallView, FloorBandView
 
 router = APIRouter(prefix="/models", tags=["models"])
-
-SIMPLER: tuple[Method, ...] = ("raw", "linear")
-FOLDS = 2
-"""Of simpler calibrations, where no take is held out."""
 
 
 @router.get(
     "/{id}/fall",
-    response_model=FallView,
+    response_model=ErrorFall,
     summary="How the error fell down to this version",
     responses=problems(409),
 )
-def error_fall(id: ModelInPath, parts: PartsNeeded) -> FallView:
+def error_fall(id: ModelInPath, parts: PartsNeeded) -> ErrorFall:
     """On the subject's takes that no version was trained on; where there is none, on those held out of each
     training in turn. Simpler calibrations are trained anew for it, on the first version's takes.
 
@@ -57,10 +52,26 @@ def error_fall(id: ModelInPath, parts: PartsNeeded) -> FallView:
     learned = [parts.store.takes.load(take.id) for take in trained]
     methods: list[Method] = [method for method in SIMPLER if method != models[0].method]
     if held_out:
-        falls = lineage_falls(models, _simpler(models[0], line[0], learned, methods, 0), takes)
+        simpler = simpler_calibrations(learned, models[0].layout, line[0].subject, methods, 0)
+        falls = lineage_falls(models, simpler, takes)
     else:
         line, falls = _held_out_in_training(line, models, learned, methods)
-    return _view(falls, _floor(takes, models[-1]), line, shown, is_held_out=bool(held_out))
+    versions: list[ModelRecord | None] = [*[None] * (len(falls) - len(line)), *line]
+    return ErrorFall(
+        model=line[-1].id,
+        steps=[
+            replace(
+                fall,
+                label=" ".join(fall.label.split()),
+                model=None if record is None else record.id,
+                effects=() if record is None else record.facts.get("effects", ()),
+            )
+            for fall, record in zip(falls, versions, strict=True)
+        ],
+        floor=_floor(takes, models[-1]),
+        takes=[TakeNamed(take.id, take.name) for take in shown],
+        is_held_out=bool(held_out),
+    )
 
 
 def _held_out(parts: Parts, line: list[ModelRecord], models: list[CalibrationModel]) -> list[TakeRecord]:
@@ -77,18 +88,9 @@ def _held_out(parts: Parts, line: list[ModelRecord], models: list[CalibrationMod
     ]
 
 
-def _simpler(
-    first: CalibrationModel, record: ModelRecord, takes: list[Take], methods: Sequence[Method], folds: int
-) -> dict[str, CalibrationModel]:
-    return {
-        method: train(takes, first.layout, record.subject, TrainingSettings(method=method, folds=folds))
-        for method in methods
-    }
-
-
 def _held_out_in_training(
     line: list[ModelRecord], models: list[CalibrationModel], takes: list[Take], methods: Sequence[Method]
-) -> tuple[list[ModelRecord], list[Fall]]:
+) -> tuple[list[ModelRecord], list[FallStep]]:
     """Of versions whose training held takes out in turn; the others are left out.
 
     Raises NotTrainable when there is none.
@@ -103,9 +105,10 @@ def _held_out_in_training(
             f"no error of model {line[-1].id[:12]} is known: it was trained without holding takes out, and "
             "every measured take was trained on; record one more"
         )
-    simpler = _simpler(models[0], line[0], takes, methods, FOLDS)
+    folds = leave_out_folds(settings_of(line[0]))
+    simpler = simpler_calibrations(takes, models[0].layout, line[0].subject, methods, folds)
     falls = [
-        Fall(name, float(error), is_scale=True)
+        FallStep(name, float(error), is_scale=True)
         for name, model in simpler.items()
         if (error := model.error_estimate.get("rmse_deg")) is not None
     ]
@@ -117,7 +120,9 @@ def _held_out_in_training(
         if before is not None and errors:
             square = np.square([list(errors.values())])
             control = with_control(model, before, square, tuple(errors))
-        falls.append(Fall(version_label(model, before), float(record.facts["held_out_rmse_deg"]), control))
+        falls.append(
+            FallStep(version_label(model, before), float(record.facts["held_out_rmse_deg"]), control)
+        )
         kept = record.facts.get("per_rotation") or {}
         before, errors = model, {name: error for name, error in kept.items() if error is not None}
     return [record for record, _ in own], falls
@@ -132,41 +137,3 @@ def _floor(takes: list[Take], model: CalibrationModel) -> FloorBand | None:
         return None
     known = {name: (floors[name].floor_deg, floors[name].low_deg, floors[name].high_deg) for name in measured}
     return FloorBand.of(known)
-
-
-def _view(
-    falls: Sequence[Fall],
-    band: FloorBand | None,
-    line: Sequence[ModelRecord],
-    takes: Sequence[TakeRecord],
-    *,
-    is_held_out: bool,
-) -> FallView:
-    """``line``: the versions that ``falls`` end with, oldest first."""
-    ids: list[ModelRecord | None] = [None] * (len(falls) - len(line))
-    named = ", ".join(take.name for take in takes)
-    how = (
-        f"On takes that no version was trained on: {named}."
-        if is_held_out
-        else "On whole takes held out of each training in turn."
-    )
-    return FallView(
-        model=line[-1].id,
-        steps=[
-            FallStepView(
-                label=" ".join(fall.label.split()),
-                model=None if record is None else record.id,
-                effects=[] if record is None else list(record.facts.get("effects", ())),
-                rmse_deg=fall.rmse_deg,
-                control_rmse_deg=fall.control_rmse_deg,
-            )
-            for fall, record in zip(falls, [*ids, *line], strict=True)
-        ],
-        floor=None
-        if band is None
-        else FloorBandView(floor_deg=band.floor_deg, low_deg=band.low_deg, high_deg=band.high_deg),
-        takes=[TakeNamed(id=take.id, name=take.name) for take in takes],
-        is_held_out=is_held_out,
-        how=how,
-        sentence=fall_sentence(falls, band),
-    )

@@ -16,25 +16,18 @@ from glovecal_models.calibration.explanation import FrameExplainer
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.servable import check_servable
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.request_types import SHA256_PREFIX, SubjectName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import SHA256_PREFIX, SubjectName
-from glovecal_service.rest.model.models import Model, ModelInFull, model_details, model_row
-from glovecal_service.store.clock import now
+from glovecal_service.rest.http.problem import Problem, change_problems
+from glovecal_service.rest.model.answer import ImportedModel
+from glovecal_service.rest.model.models import model_in_full, model_row
+from glovecal_service.store.database import now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord, hand_of
 
 router = APIRouter(prefix="/models", tags=["models"])
 
 MEDIA_TYPE = "application/octet-stream"
-
-
-class ImportedModel(BaseModel):
-    model: Model
-    is_new: bool = Field(description="False: the very same model was here before.")
-    layout_is_new: bool
-    subject_created: bool
 
 
 class ModelImport(BaseModel):
@@ -65,7 +58,7 @@ class ModelImport(BaseModel):
 )
 async def import_model(
     request: Request, response: Response, parts: PartsNeeded, options: Annotated[ModelImport, Query()]
-) -> dict[str, Any]:
+) -> ImportedModel:
     """The body is what `models/{id}/export` gave. Nothing in it is executed; a file that does not predict a
     frame is refused and changes nothing. The model is not activated.
 
@@ -82,16 +75,16 @@ async def import_model(
     finally:
         if upload.is_new:  # what was good is an artifact now
             upload.path.unlink(missing_ok=True)
-    response.status_code = 201 if found["is_new"] else 200
+    response.status_code = 201 if found.is_new else 200
     return found
 
 
-def _import(parts: Parts, path: Path, options: ModelImport) -> dict[str, Any]:
+def _import(parts: Parts, path: Path, options: ModelImport) -> ImportedModel:
     return import_artifact(parts, path.read_bytes(), options)
 
 
-def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> dict[str, Any]:
-    """An ``ImportedModel``. Raises BadInput for what does not predict a frame, NotFound, Conflict."""
+def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> ImportedModel:
+    """Raises BadInput for what does not predict a frame, NotFound, Conflict."""
     if options.id is not None and not model_id(artifact).startswith(options.id):
         raise BadInput(
             f"no model was imported: the sender's is {options.id[:12]}, this file is "
@@ -120,12 +113,12 @@ def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> dict
         facts=_facts(model, takes),
         hand=hand_of(take for take in takes if take.artifact in model.takes),
     )
-    return {
-        "model": model_row(record, parts.store.models.is_active(record)),
-        "is_new": record.id not in known,
-        "layout_is_new": layout_is_new,
-        "subject_created": subject_created,
-    }
+    return ImportedModel(
+        model=model_row(record, parts.store.models.is_active(record)),
+        is_new=record.id not in known,
+        layout_is_new=layout_is_new,
+        subject_created=subject_created,
+    )
 
 
 def _tried(artifact: bytes) -> CalibrationModel:
@@ -141,7 +134,7 @@ def _tried(artifact: bytes) -> CalibrationModel:
             model_id(artifact), model.subject, model.layout.name, model.method, model.parent,
             _facts(model, ()), now(),
         )  # fmt: skip
-        ModelInFull.model_validate(model_row(record, False) | model_details(model))
+        model_in_full(record, False, model)
         check_servable(model)
         FrameExplainer(model).frame(0.0, readings, {}, "")
     except (DamagedArtifact, BadInput) as error:

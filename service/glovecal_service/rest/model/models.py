@@ -2,100 +2,41 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Any, Literal
+from typing import Annotated
 
 import numpy as np
-from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field
+from fastapi import APIRouter, Request, Response
+from pydantic import Field
 
+from glovecal_models.calibration.answer import ModelEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
+from glovecal_models.calibration.text import model_effect, wearing_sentences
 from glovecal_models.errors import DamagedArtifact
-from glovecal_models.hand.handedness import Handedness, is_of_hand
-from glovecal_models.regression.known_line import gains_of
-from glovecal_models.regression.linear_regressor import LinearRegressor
-from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import change_problems, problems
-from glovecal_service.rest.http.damaged_rows import warn, without_damaged
+from glovecal_models.hand.rotations import Handedness, is_of_hand
+from glovecal_models.regression.kernel_candidates import CANDIDATE
+from glovecal_models.regression.kernel_scores import choice_of
+from glovecal_models.regression.linear_regressor import LinearRegressor, gains_of
+from glovecal_models.regression.regressor import Regressor
+from glovecal_service.plain import document_of, plain, plain_text, read
+from glovecal_service.request_types import Identifier, StrictBody, SubjectName
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.http.request_types import (
-    HandFilter,
-    Identifier,
-    LayoutFilter,
-    ModelInPath,
-    StrictBody,
-    SubjectFilter,
-    SubjectName,
+from glovecal_service.rest.http.list_part import PartWanted, tell_rest
+from glovecal_service.rest.http.problem import change_problems, problems, warn, without_damaged
+from glovecal_service.rest.http.request_types import HandFilter, LayoutFilter, ModelInPath, SubjectFilter
+from glovecal_service.rest.model.answer import (
+    ActivationView,
+    KernelChoiceView,
+    KernelScoreView,
+    LineView,
+    Model,
+    ModelInFull,
+    Rotation,
+    UnseenWearingView,
 )
 from glovecal_service.store.errors import StoreDamaged
-from glovecal_service.store.records import Activation, ModelRecord
-from glovecal_service.views.training import EffectView, KernelChoiceView, effect_view, kernel_view
-from glovecal_service.views.unseen_wearing import UnseenWearingView, unseen_wearing_view
+from glovecal_service.store.records import NAME, NOTE, Activation, ModelRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
-
-
-class Model(BaseModel):
-    id: str = Field(description="sha256 of the artifact.")
-    subject: str
-    layout: str
-    method: str
-    parent: str | None
-    hand: Handedness | None = Field(
-        description="That of the takes it was trained on: a subject's gloves have models of their own. Null: "
-        "nobody said it, and it reads both."
-    )
-    active: bool = Field(
-        description="Whether live frames of the subject with the layout are predicted by it."
-    )
-    damage: str | None = Field(
-        description="Of an active model in a list: why its artifact cannot be loaded, and what to do."
-    )
-    held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
-    rmse_unseen_wearing_deg: float | None = Field(
-        description="Error in a wearing not seen in training, degrees; null: one wearing only, or unknown."
-    )
-    effects: list[str] = Field(description="Names of its effects, in the order in which they were added.")
-    facts: dict[str, Any] = Field(description="Takes trained on, errors, how long it took ...")
-    created_at: datetime
-
-
-class LineView(BaseModel):
-    """angle = offset_deg + the sum of scale times reading (Krnoul et al. 2016, Figure 1)."""
-
-    scale_deg: dict[str, float] = Field(description="Degrees a count, by what is read.")
-    offset_deg: float = Field(description="The angle at reading zero.")
-
-
-class Rotation(BaseModel):
-    rotation: str
-    kind: str = Field(description="1S1R, MS1R, 0S1R or MSMR.")
-    sensors: list[str]
-    method: str
-    held_out_rmse_deg: float | None
-    noise_deg: float | None = Field(description="Standard deviation of the measurement noise.")
-    uncertain_above_deg: float
-    samples: int
-    kernel_choice: KernelChoiceView | None = Field(description="Of a model trained with `auto`, else null.")
-    line: LineView | None = Field(description="Of a linear rotation or a template's equation, else null.")
-
-
-class ModelInFull(Model):
-    rotations: list[Rotation]
-    effect_details: list[EffectView]
-    simulated: bool = Field(description="Whether any training take came from a simulated glove.")
-    error_estimate: dict[str, Any]
-    unseen_wearing: UnseenWearingView | None = Field(description="Null for a model of an earlier version.")
-
-
-class ActivationView(BaseModel):
-    id: int
-    subject: str
-    layout: str
-    model: str
-    kind: Literal["activate", "rollback"]
-    previous: int | None
-    created_at: datetime
 
 
 class Which(StrictBody):
@@ -107,13 +48,18 @@ class Which(StrictBody):
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
 def list_models(
     store: StoreNeeded,
+    request: Request,
     response: Response,
+    part: PartWanted,
     subject: SubjectFilter = None,
     layout: LayoutFilter = None,
     hand: HandFilter = None,
-) -> list[dict[str, Any]]:
-    """Damaged rows are left out and named in `Warning` headers."""
-    every = without_damaged(response, lambda: store.models.list(subject=subject, layout=layout))
+    removed: bool = False,
+) -> list[Model]:
+    """Damaged rows are left out and named in `Warning` headers. `removed`: those that were removed. More than
+    `limit`: see `Link`."""
+    tell_rest(request, response, part, store.models.count(subject, removed=removed, part=part))
+    every = without_damaged(response, lambda: store.models.list(subject, layout, removed=removed, part=part))
     records = [record for record in every if is_of_hand(record.hand, hand)]
     active = set()
     for pair in sorted({(record.subject, record.layout) for record in records}):
@@ -140,12 +86,37 @@ def roll_back(body: Which, store: StoreNeeded) -> Activation:
 
 
 @router.get("/{id}", response_model=ModelInFull, summary="One model", responses=problems(409))
-def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
+def get_model(id: ModelInPath, parts: PartsNeeded) -> ModelInFull:
     record = parts.store.models.get(id)
     if damage := parts.store.models.damage(record):
         raise DamagedArtifact(damage)
     model, _ = parts.predictors.get(record.id)
-    return model_row(record, parts.store.models.is_active(record)) | model_details(model)
+    return model_in_full(record, parts.store.models.is_active(record), model)
+
+
+class Described(StrictBody):
+    name: Annotated[str, Field(max_length=80)]
+    note: Annotated[str, Field(max_length=2000)] = ""
+
+
+@router.put("/{id}/name", response_model=Model, summary="Name a model", responses=change_problems(409))
+def describe_model(id: ModelInPath, body: Described, store: StoreNeeded) -> Model:
+    """What people call it, and what they want to remember of it."""
+    record = store.models.describe(id, name=plain_text(body.name), note=plain_text(body.note))
+    return model_row(record, store.models.is_active(record))
+
+
+@router.delete("/{id}", response_model=Model, summary="Remove a model", responses=change_problems(409))
+def remove_model(id: ModelInPath, store: StoreNeeded) -> Model:
+    """It is left out of lists; what was made of it stays, and `restore` undoes it. 409 for an active one."""
+    return model_row(store.models.remove(id), active=False)
+
+
+@router.post(
+    "/{id}/restore", response_model=Model, summary="Undo the removal", responses=change_problems(409)
+)
+def restore_model(id: ModelInPath, store: StoreNeeded) -> Model:
+    return model_row(store.models.restore(id), active=False)
 
 
 @router.get(
@@ -154,7 +125,7 @@ def get_model(id: ModelInPath, parts: PartsNeeded) -> dict[str, Any]:
     summary="The model, its parent, the parent's parent ...",
     responses=problems(409),
 )
-def get_lineage(id: ModelInPath, store: StoreNeeded) -> list[dict[str, Any]]:
+def get_lineage(id: ModelInPath, store: StoreNeeded) -> list[Model]:
     line = store.models.lineage(id)
     return [model_row(record, store.models.is_active(record)) for record in line]
 
@@ -192,54 +163,85 @@ def export_model(id: ModelInPath, store: StoreNeeded) -> Response:
     )
 
 
-def model_row(record: ModelRecord, active: bool, damage: str = "") -> dict[str, Any]:
-    """As ``Model`` shows it."""
+def model_row(record: ModelRecord, active: bool, damage: str = "") -> Model:
+    known = {name: plain(record.facts.get(name)) for name in ("held_out_rmse_deg", "rmse_unseen_wearing_deg")}
     effects = list(record.facts.get("effects", ()))
-    row = {
-        **record.__dict__,
-        "active": active,
-        "effects": effects,
-        "facts": plain(record.facts),
-    }
-    row["damage"] = damage or None
-    return row | {
-        name: plain(record.facts.get(name)) for name in ("held_out_rmse_deg", "rmse_unseen_wearing_deg")
-    }
+    named = {key: record.facts.get(key, "") for key in (NAME, NOTE)}
+    own = {**vars(record), **named, "facts": plain(record.facts), "effects": effects}
+    return Model(**own, **known, active=active, damage=damage or None)
 
 
-def model_details(model: CalibrationModel) -> dict[str, Any]:
-    """What ``ModelInFull`` shows of the artifact itself."""
-    return {
-        "rotations": [_rotation(item) for item in model.rotations],
+def model_in_full(record: ModelRecord, active: bool, model: CalibrationModel) -> ModelInFull:
+    """With what the artifact itself holds. Raises pydantic.ValidationError for a strange one."""
+    row = dict(model_row(record, active))
+    row |= {
         "effects": [item.name for item in model.effects],
-        "effect_details": [effect_view(item) for item in model.effects],
-        "simulated": model.simulated,
-        "error_estimate": plain(model.error_estimate),
         "held_out_rmse_deg": plain(model.error_estimate.get("rmse_deg")),
-        "unseen_wearing": unseen_wearing_view(model),
     }
+    return ModelInFull(
+        **row,
+        rotations=[_rotation(item) for item in model.rotations],
+        effect_details=[read(ModelEffect, document_of(model_effect(item))) for item in model.effects],
+        simulated=model.simulated,
+        error_estimate=plain(model.error_estimate),
+        unseen_wearing=_unseen_wearing(model),
+    )
 
 
-def _rotation(item: RotationModel) -> dict[str, Any]:
-    return {
-        "rotation": item.rotation,
-        "kind": item.correspondence.kind,
-        "sensors": list(item.correspondence.sensors),
-        "method": item.regressor.method,
-        "held_out_rmse_deg": plain(item.held_out_rmse_deg),
-        "noise_deg": plain(float(np.sqrt(item.regressor.noise_variance))),
-        "uncertain_above_deg": item.uncertain_above_deg,
-        "samples": item.samples,
-        "kernel_choice": kernel_view(item.rotation, item.regressor),
-        "line": _line(item),
-    }
+def _unseen_wearing(model: CalibrationModel) -> UnseenWearingView | None:
+    """None: an older model."""
+    found = model.unseen_wearing
+    if found is None:
+        return None
+    known = {name: getattr(found, name) for name in UnseenWearingView.model_fields if hasattr(found, name)}
+    seen_deg = model.error_estimate.get("rmse_deg")
+    own = {"rmse_unseen_wearing_deg": found.rmse_deg, "rmse_deg": seen_deg}
+    return UnseenWearingView(**plain(known | own), sentences=wearing_sentences(model, seen_deg))
 
 
-def _line(item: RotationModel) -> dict[str, Any] | None:
+def _rotation(item: RotationModel) -> Rotation:
+    return Rotation(
+        rotation=item.rotation,
+        kind=item.correspondence.kind,
+        sensors=list(item.correspondence.sensors),
+        method=item.regressor.method,
+        held_out_rmse_deg=plain(item.held_out_rmse_deg),
+        noise_deg=plain(float(np.sqrt(item.regressor.noise_variance))),
+        uncertain_above_deg=item.uncertain_above_deg,
+        samples=item.samples,
+        kernel_choice=_kernel_choice(item.rotation, item.regressor),
+        line=_line(item),
+    )
+
+
+def _kernel_choice(rotation: str, regressor: Regressor) -> KernelChoiceView | None:
+    """None when nothing was chosen."""
+    found = choice_of(regressor)
+    if found is None:
+        return None
+    return KernelChoiceView(
+        sentence=found.sentence(rotation),
+        samples=found.samples,
+        straight_line_deg=plain(found.straight_line_deg),
+        spread_deg=plain(found.spread_deg),
+        candidates=[
+            KernelScoreView(
+                kernel=item.name,
+                words=CANDIDATE[item.name].words,
+                chosen=item is found.chosen,
+                nlml=plain(item.nlml),
+                evidence_gain=plain(found.evidence_gain(item)),
+                held_out_rmse_deg=plain(item.held_out_rmse_deg),
+            )
+            for item in found.scores
+        ],
+    )
+
+
+def _line(item: RotationModel) -> LineView | None:
     if not isinstance(item.regressor, LinearRegressor):
         return None
     gains, offset = gains_of(item.regressor)
-    return {
-        "scale_deg": dict(zip(item.correspondence.inputs, gains.tolist(), strict=True)),
-        "offset_deg": offset,
-    }
+    return LineView(
+        scale_deg=dict(zip(item.correspondence.inputs, gains.tolist(), strict=True)), offset_deg=offset
+    )

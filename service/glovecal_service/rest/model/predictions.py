@@ -10,11 +10,12 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.errors import BadInput, LayoutMismatch
-from glovecal_models.inverse_kinematics.steadied import steadied
+from glovecal_models.sampling.inverse_kinematics.follow import steadied
 from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.request_types import Channel, StrictBody, WearingName
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody, WearingName
+from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.http.request_types import ModelInPath
 
 router = APIRouter(prefix="/models", tags=["models"])
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter
 from pydantic import Field
 
@@ -15,10 +13,12 @@ from glovecal_models.calibration.refinement import (
     Refinement,
     refined,
 )
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.request_types import Channel, StrictBody
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import Channel, ModelInPath, StrictBody
-from glovecal_service.rest.model.models import Model, model_row
+from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.http.request_types import ModelInPath
+from glovecal_service.rest.model.answer import Model
+from glovecal_service.rest.model.models import model_row
 
 router = APIRouter(prefix="/models", tags=["models"])
 
@@ -44,7 +44,7 @@ class Refine(StrictBody):
     summary="Refine scale and offset by hand",
     responses=change_problems(409),
 )
-def refine_model(id: ModelInPath, body: Refine, parts: PartsNeeded) -> dict[str, Any]:
+def refine_model(id: ModelInPath, body: Refine, parts: PartsNeeded) -> Model:
     """Only rotations that are lines (raw, linear, two_shapes, template) and that no effect corrects.
 
     The model stays; its child has the same takes and an unknown held-out error. Take it back with

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.calibration.artifact import dump
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.request_types import Identifier, StrictBody, SubjectName
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import Identifier, ModelInPath, StrictBody, SubjectName
-from glovecal_service.rest.model.model_import import ImportedModel, ModelImport, import_artifact
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import ModelInPath
+from glovecal_service.rest.model.answer import CalibrationFile, ImportedCalibration
+from glovecal_service.rest.model.model_import import ModelImport, import_artifact
 from glovecal_service.store.errors import NotFound
-from glovecal_service.vendor_calibrations.formats import calibration_format
-from glovecal_service.vendor_calibrations.line_model import MOST_CHARACTERS, read_model, write_model
+from glovecal_service.vendor_calibrations.formats import (
+    MOST_CHARACTERS,
+    FormatName,
+    calibration_format,
+    read_model,
+    write_model,
+)
 
 router = APIRouter(prefix="/models", tags=["models"])
-
-FormatName = Literal["virtualhand", "asr", "shadow_xml", "shadow_yaml", "opengloves", "lerobot"]
 
 
 class Calibration(StrictBody):
@@ -29,20 +34,6 @@ class Calibration(StrictBody):
     create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
 
 
-class ImportedCalibration(ImportedModel):
-    left_out: dict[str, str] = Field(
-        description="Sensors of the file that the layout does not read, and why."
-    )
-    doubts: dict[str, str] = Field(
-        description="Sensors whose line misses points of the file, and by how much."
-    )
-
-
-class CalibrationFile(BaseModel):
-    text: str
-    left_out: dict[str, str] = Field(description="Rotations that the format cannot say, and why.")
-
-
 @router.post(
     "/calibrations",
     status_code=201,
@@ -51,7 +42,7 @@ class CalibrationFile(BaseModel):
     responses=change_problems(409)
     | {200: {"model": ImportedCalibration, "description": "This very model was here already."}},
 )
-def import_calibration(body: Calibration, response: Response, parts: PartsNeeded) -> dict[str, Any]:
+def import_calibration(body: Calibration, response: Response, parts: PartsNeeded) -> ImportedCalibration:
     """Kept as a model of lines, each with its scale and offset; it is not activated. 422 names the line."""
     try:
         hand = parts.store.subjects.get(body.subject).known_hand or "right"
@@ -63,8 +54,8 @@ def import_calibration(body: Calibration, response: Response, parts: PartsNeeded
     model, found = read_model(body.text, calibration_format(body.format), layout, body.subject, hand)
     options = ModelImport(subject=body.subject, create_subject=body.create_subject, id=None)
     answer = import_artifact(parts, dump(model), options)
-    response.status_code = 201 if answer["is_new"] else 200
-    return answer | {"left_out": dict(found.left_out), "doubts": dict(found.doubts)}
+    response.status_code = 201 if answer.is_new else 200
+    return ImportedCalibration(**dict(answer), left_out=dict(found.left_out), doubts=dict(found.doubts))
 
 
 @router.get(

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, Field
 
 from glovecal_models.calibration.artifact import load
-from glovecal_models.sampling.active.next_step import diagnosed_take, propose_for_model
+from glovecal_models.sampling.active.next_step import propose_for_model
 from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import problems
+from glovecal_service.questions.chosen_takes import model_takes
+from glovecal_service.questions.diagnose import newest_diagnosis
 from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.problem import problems
 from glovecal_service.rest.http.request_types import ModelInPath
-from glovecal_service.rest.model.model_takes import model_takes
+from glovecal_service.rest.sampling.answer import DiagnosedTakeView, NextStepsView
 from glovecal_service.store.records import ModelRecord, TakeRecord
 from glovecal_service.store.store import Store
 
@@ -24,40 +25,6 @@ LONGEST_OTHER_S = 600.0
 """Longer takes than this are not read for everyday readings."""
 
 
-class ProposedStepView(BaseModel):
-    name: str
-    ask: str = Field(description="What the person is asked to do.")
-    needs: str
-    seconds: float = Field(description="Capture time, with countdown and settling.")
-    angles: dict[str, float] = Field(description="Degrees by rotation that are then known.")
-    sd_deg: dict[str, float] = Field(description="Standard deviation now, of the rotations it teaches.")
-    sd_after_deg: dict[str, float]
-    rms_sd_after_deg: float = Field(description="Over all rotations.")
-    error_fall_deg: float = Field(description="Of the expected error of a frame, noise included.")
-    sentence: str
-
-
-class DiagnosedTakeView(BaseModel):
-    what: str
-    seconds: float
-    separates: list[str]
-    reason: str
-
-
-class NextStepsView(BaseModel):
-    model: str
-    rms_sd_deg: float = Field(description="Root mean variance over everyday readings and rotations, now.")
-    sd_deg: dict[str, float]
-    noise_deg: dict[str, float] = Field(description="Of a single frame.")
-    enough: bool = Field(description="No step is worth its time any more.")
-    steps: list[ProposedStepView] = Field(description="The one that teaches most for its time first.")
-    diagnosed: DiagnosedTakeView | None = Field(
-        description="What the newest diagnosis of the model asks for."
-    )
-    assumed: list[str] = Field(description="Rotations whose hyperparameters are assumed, not learned.")
-    sentences: list[str]
-
-
 @router.get(
     "/{id}/next-steps",
     response_model=NextStepsView,
@@ -66,7 +33,7 @@ class NextStepsView(BaseModel):
 )
 def next_steps(
     id: ModelInPath, store: StoreNeeded, most: Annotated[int, Query(ge=1, le=200)] = 10
-) -> dict[str, Any]:
+) -> NextStepsView:
     """Poses, ramps and widgets by the expected fall of the error per second of capture. Nothing is stored;
     `POST /v1/sampling` with protocol `active` asks for them one after the other."""
     record = store.models.get(id)
@@ -75,9 +42,14 @@ def next_steps(
     others = [store.takes.load(row.id) for row in _others(store, record, rows)]
     model = load(store.models.load_bytes(record.id), expected_id=record.id)
     found = propose_for_model(model, takes, others)
-    return plain(
-        {"model": record.id, **found.to_document(most), "diagnosed": _newest_diagnosis(store, record)}
-    )
+    told = plain(found.to_document(most))
+    return NextStepsView(model=record.id, **told, diagnosed=_diagnosed(store, record))
+
+
+def _diagnosed(store: Store, record: ModelRecord) -> DiagnosedTakeView | None:
+    newest = newest_diagnosis(store, record)
+    wanted = None if newest is None else newest.next_take
+    return None if wanted is None else DiagnosedTakeView.model_validate(wanted, from_attributes=True)
 
 
 def _others(store: Store, record: ModelRecord, trained: list[TakeRecord]) -> list[TakeRecord]:
@@ -88,13 +60,3 @@ def _others(store: Store, record: ModelRecord, trained: list[TakeRecord]) -> lis
         row for row in every if row.id not in ids and row.wearing in wearings and row.is_of(record.hand)
     ]
     return [row for row in others if row.duration_s <= LONGEST_OTHER_S][::-1][:MOST_OTHER_TAKES]
-
-
-def _newest_diagnosis(store: Store, record: ModelRecord) -> dict[str, Any] | None:
-    done = [
-        job
-        for job in store.jobs.list(subject=record.subject)
-        if job.kind == "diagnose" and job.state == "done" and (job.result or {}).get("model") == record.id
-    ]
-    newest = max(done, key=lambda job: job.updated_at, default=None)
-    return None if newest is None else diagnosed_take(newest.result or {})

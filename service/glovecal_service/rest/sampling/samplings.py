@@ -6,35 +6,37 @@ import asyncio
 import secrets
 import time
 from collections.abc import AsyncIterator
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from pydantic import BaseModel, Field, FiniteFloat
+from pydantic import Field, FiniteFloat
 
-from glovecal_models.hand.handedness import known_hand
-from glovecal_models.sampling.catalogue import ROD_MM, Equipment, ProtocolName, make_protocol
-from glovecal_models.sampling.engine import Sampling, begin_sampling
+from glovecal_models.hand.rotations import known_hand
+from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.sampling.catalogue import ROD_MM, Equipment, Order, ProtocolName, make_protocol
+from glovecal_models.sampling.engine import SHOWN_S, TIMER_S, Event, NotNow, Sampling, begin_sampling
 from glovecal_models.sampling.guided.touch_watch import require_possible_touches
-from glovecal_models.sampling.order import Order
+from glovecal_models.sampling.limits import SAMPLING_LIMITS
+from glovecal_models.sampling.protocol import COUNTDOWN_S, SETTLE_S
+from glovecal_models.sampling.sampled_takes import repeatability
+from glovecal_models.sampling.shown_hands import shown_hands
 from glovecal_models.sampling.state import SamplingState, Trigger
-from glovecal_models.sampling.user_events import Event, NotNow
-from glovecal_service.rest.http.answers import change_problems, problems
-from glovecal_service.rest.http.damaged_rows import without_damaged
-from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.request_types import (
+from glovecal_service.request_types import (
     IDENTIFIER,
     Channel,
     Identifier,
-    IdInPath,
     StrictBody,
     SubjectName,
     WearingName,
 )
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
+from glovecal_service.rest.http.request_types import IdInPath
+from glovecal_service.rest.sampling.answer import Reused, SamplingView, StepDone, StepNow, TargetView
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.sampling_reuse import reuse_takes
-from glovecal_service.views.sampling import SamplingView, TargetView, sampling_view, target_view
 
 router = APIRouter(prefix="/sampling", tags=["sampling"])
 
@@ -86,11 +88,6 @@ class Reuse(StrictBody):
     subject: SubjectName = Field(description="For whom the takes are to be used too.")
 
 
-class Reused(BaseModel):
-    takes: list[str] = Field(description="New takes, marked as rough.")
-    left_out: list[str] = Field(description="Why others cannot be used, in sentences.")
-
-
 @router.post(
     "",
     status_code=201,
@@ -127,7 +124,7 @@ def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) ->
         document=state.to_document(),
     )
     response.headers["Location"] = f"/v1/sampling/{record.id}"
-    return sampling_view(record)
+    return _view(record)
 
 
 @router.get("", response_model=list[SamplingView], summary="Samplings, newest first", responses=problems())
@@ -139,12 +136,12 @@ def list_samplings(
 ) -> list[SamplingView]:
     """Damaged rows are left out and named in `Warning` headers."""
     records = without_damaged(response, lambda: store.samplings.list(glove=glove, only_open=only_open))
-    return [sampling_view(record) for record in records]
+    return [_view(record) for record in records]
 
 
 @router.get("/{id}", response_model=SamplingView, summary="One sampling", responses=problems())
 def get_sampling(id: IdInPath, store: StoreNeeded) -> SamplingView:
-    return sampling_view(store.samplings.get(id))
+    return _view(store.samplings.get(id))
 
 
 @router.get(
@@ -156,7 +153,7 @@ def get_sampling(id: IdInPath, store: StoreNeeded) -> SamplingView:
 def get_target(id: IdInPath, store: StoreNeeded) -> TargetView:
     """On the subject's own hand, so that fingertips which are to touch do so in the picture."""
     record = store.samplings.get(id)
-    return target_view(record, store.subjects.get(record.subject).skeleton())
+    return _target(record, store.subjects.get(record.subject).skeleton())
 
 
 @router.post(
@@ -192,7 +189,7 @@ def change_sampling(
             raise Conflict(str(error)) from error
         kept = store.samplings.save(record, sampling.state.to_document())
         if kept is not None:
-            return sampling_view(kept)
+            return _view(kept)
     raise Conflict(f"sampling {id} changes too fast; try again")
 
 
@@ -216,7 +213,7 @@ async def sampling_events(
     until, shown = time.monotonic() + LONGEST_STREAM_S, None
     while time.monotonic() < until:
         record = await asyncio.to_thread(store.samplings.get, sampling.id)
-        view = sampling_view(record)
+        view = _view(record)
         if view.say_number > last_event_id:
             last_event_id = view.say_number
             yield ServerSentEvent(event="say", id=str(last_event_id), data=view.say)
@@ -228,3 +225,72 @@ async def sampling_events(
             yield ServerSentEvent(event="over", data=view.model_dump(mode="json"))
             return
         await asyncio.sleep(LOOK_EVERY_S)
+
+
+def _view(record: SamplingRecord) -> SamplingView:
+    state = SamplingState.from_document(record.document)
+    own = {name: getattr(record, name) for name in SamplingView.model_fields if hasattr(record, name)}
+    return SamplingView(
+        **own,
+        protocol=state.protocol.name,
+        trigger=state.trigger,
+        seed=state.protocol.seed,
+        phase=state.phase,
+        phase_s=round(max(0.0, time.time() - state.since_s), 2),
+        phase_of_s=_length(state),
+        step=_step_now(state),
+        steps=_steps(state),
+        say=state.said,
+        say_number=state.said_number,
+        steadiness_percent=record.live.get("steadiness_percent"),
+        still_percent=SAMPLING_LIMITS.still_percent,
+        capture_s=round(state.capture_s, 2),
+        capture_of_s=round(state.protocol.capture_s, 2),
+        expected=state.expected,
+        sentences=state.sentences,
+        repeatability=repeatability(state),
+    )
+
+
+def _target(record: SamplingRecord, skeleton: Skeleton) -> TargetView:
+    """What the step at hand looks like on the hand of ``skeleton``."""
+    state = SamplingState.from_document(record.document)
+    return TargetView(step=state.step, hands=shown_hands(state.now(), skeleton) if state.step else [])
+
+
+def _length(state: SamplingState) -> float | None:
+    if not state.step:
+        return None
+    lengths = {"countdown": COUNTDOWN_S, "settling": SETTLE_S, "recording": state.now().seconds}
+    if state.trigger == "timer":
+        lengths["waiting"] = TIMER_S
+    if state.phase == "judged":
+        return _shown_s(state)
+    return lengths.get(state.phase)
+
+
+def _shown_s(state: SamplingState) -> float | None:
+    if state.attempts[-1].counts:
+        return SHOWN_S
+    return None if state.trigger == "key" else TIMER_S
+
+
+def _step_now(state: SamplingState) -> StepNow | None:
+    if not state.step:
+        return None
+    document: dict[str, Any] = state.now().to_document()
+    names = [step.name for step in state.protocol.steps]
+    return StepNow(**document, place=names.index(state.step) + 1)
+
+
+def _steps(state: SamplingState) -> list[StepDone]:
+    told = {attempt.step: attempt for attempt in state.attempts if not attempt.withdrawn} | state.finished()
+    return [
+        StepDone(
+            name=step.name,
+            kind=step.kind,
+            outcome=told[step.name].outcome if step.name in told else "",
+            reasons=list(told[step.name].reasons) if step.name in told else [],
+        )
+        for step in state.protocol.steps
+    ]

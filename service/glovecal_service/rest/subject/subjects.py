@@ -2,29 +2,62 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from glovecal_models.hand.dimensions import DIMENSIONS
-from glovecal_models.hand.handedness import Handedness
-from glovecal_models.hand.skeleton import Palm
-from glovecal_models.hand.skeleton_document import skeleton_document
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_models.hand.rotations import Handedness, is_of_hand
+from glovecal_models.hand.skeleton import Palm, skeleton_document
+from glovecal_models.quick_check.answer import DUE
+from glovecal_service.plain import plain
+from glovecal_service.request_types import Channel, Millimetres, StrictBody, SubjectName, Title
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.request_types import (
-    Channel,
-    LayoutFilter,
-    Millimetres,
-    StrictBody,
-    SubjectInPath,
-    SubjectName,
-    Title,
-)
-from glovecal_service.store.records import SubjectRecord
-from glovecal_service.views.history import HistoryView, history_view
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import LayoutFilter, SubjectInPath
+from glovecal_service.rest.subject.answer import HistoryRowView, HistoryView, SkeletonView, Subject
+from glovecal_service.store.records import ModelRecord, SubjectRecord
+
+
+def history_view(subject: str, records: Sequence[ModelRecord]) -> HistoryView:
+    """``records``: the subject's models, oldest first."""
+    rows = [_row(record) for record in records]
+    hands: set[Handedness | None] = {record.hand for record in records if record.hand} or {None}
+    newest = [next((each for each in records[::-1] if is_of_hand(each.hand, hand)), None) for hand in hands]
+    is_due = any(
+        each.facts.get("quick_check", {}).get("is_full_calibration_due")
+        for each in newest
+        if each is not None
+    )
+    checks = [row for row in rows if row.as_found_deg is not None]
+    sentences = []
+    if checks:
+        found = ", ".join(f"{row.as_found_deg:.1f}" for row in checks)
+        sentences.append(f"As found, in the order of the quick checks: {found} degrees.")
+    if is_due:
+        sentences.append(DUE)
+    return HistoryView(subject=subject, rows=rows, is_full_calibration_due=is_due, sentences=sentences)
+
+
+def _row(record: ModelRecord) -> HistoryRowView:
+    check, facts = record.facts.get("quick_check"), plain(record.facts)
+    of_check = {name: (facts.get("quick_check") or {}).get(name) for name in OF_CHECK}
+    return HistoryRowView(
+        made_at=record.created_at,
+        model=record.id,
+        layout=record.layout,
+        hand=record.hand,
+        kind="calibration" if check is None else "quick check",
+        **of_check,
+        **{name: facts.get(name) if check is None else None for name in OF_CALIBRATION},
+    )
+
+
+OF_CHECK = ("wearing", "as_found_deg", "as_left_deg")
+OF_CALIBRATION = ("rmse_unseen_wearing_deg", "held_out_rmse_deg")
+
 
 router = APIRouter(prefix="/subjects", tags=["subjects"])
 
@@ -49,59 +82,6 @@ class NewSubject(StrictBody):
 class MeasuredHand(StrictBody):
     dimensions: Dimensions
     hand: Handedness | None = Field(None, description="Null: as it was.")
-
-
-class Subject(BaseModel):
-    name: str
-    title: str
-    dimensions: dict[str, float] = Field(description="Measured hand dimensions in millimetres.")
-    hand: str = Field(description="right, left, or unknown: for what does not say its hand itself.")
-    created_at: datetime
-
-
-class SkeletonRotationView(BaseModel):
-    name: str
-    low: float = Field(description="Limits, degrees.")
-    high: float
-    rule: dict[str, float] | None = Field(
-        description="What stands in when it is not measured: a weighted sum of other rotations,"
-    )
-    rest: float | None = Field(description="or else an angle.")
-
-
-class JointView(BaseModel):
-    name: str
-    parent: str | None = Field(description="Null for the forearm.")
-    offset: list[float] = Field(description="In the parent's frame, mm.")
-    orientation: list[float] = Field(description="Quaternion w, x, y, z, in the parent's frame.")
-    axis: list[float]
-    rotations: dict[str, float] = Field(description="The joint's angle: the sum of weight times rotation.")
-
-
-class TipView(BaseModel):
-    finger: str
-    joint: str
-    offset: list[float] = Field(description="In the joint's frame, mm.")
-
-
-class HandSizes(BaseModel):
-    sizes: dict[str, float] = Field(description="Every dimension, mm.")
-    measured: list[str] = Field(description="Those that were measured; the others follow from hand_length.")
-
-
-class SkeletonView(BaseModel):
-    format: str = Field(description="glovecal.skeleton.v1")
-    hand: str
-    length_unit: str
-    angle_unit: str
-    dimensions: HandSizes
-    rotations: list[SkeletonRotationView]
-    joints: list[JointView] = Field(
-        description="Parents before children: frame(joint) = frame(parent) . translate(offset) . "
-        "orient(orientation) . turn(axis, angle). x along the middle metacarpal to the fingers, z out of the "
-        "back of the hand, y to the thumb of a right hand; right-handed."
-    )
-    tips: list[TipView]
 
 
 @router.post(

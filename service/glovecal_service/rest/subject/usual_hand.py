@@ -6,11 +6,10 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from glovecal_models.hand.handedness import Handedness
-from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.hand.skeleton_document import skeleton_document
-from glovecal_service.rest.http.answers import problems
-from glovecal_service.rest.subject.subjects import SkeletonView
+from glovecal_models.hand.rotations import Handedness
+from glovecal_models.hand.skeleton import hand_skeleton, skeleton_document
+from glovecal_service.rest.http.problem import problems
+from glovecal_service.rest.subject.answer import SkeletonView
 
 router = APIRouter(prefix="/skeleton", tags=["subjects"])
 

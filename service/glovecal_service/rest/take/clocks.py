@@ -6,13 +6,14 @@ from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from glovecal_models.takes.answer import TakeClock
 from glovecal_models.takes.clock_scan import clock_offsets
 from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.request_types import Id, StrictBody
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.request_types import Id, StrictBody
+from glovecal_service.rest.http.problem import change_problems
 from glovecal_service.store.takes import CLOCK_OFFSET
 
 router = APIRouter(prefix="/takes/clocks", tags=["takes"])
@@ -28,22 +29,8 @@ class ClocksRequest(Wanted):
     repair: bool = Field(False, description="Move each reference whose clock is found to be off.")
 
 
-class ClockView(BaseModel):
-    id: str
-    take: str
-    verdict: str = Field(description='"offset", "agrees", "not identifiable" or "range too small".')
-    offset_s: float | None = Field(description="Reference time = frame time + offset; 0 unless found.")
-    low_s: float | None
-    high_s: float | None
-    unexplained_before: float | None = Field(description="Share of the variance that no linear map explains.")
-    unexplained_after: float | None
-    unexplained_reversed: float | None = Field(description="The same by chance: sensors played backwards.")
-    sentence: str
-    repaired: bool
-
-
 @router.post(
-    "", response_model=list[ClockView], summary="Examine reference clocks", responses=change_problems(409)
+    "", response_model=list[TakeClock], summary="Examine reference clocks", responses=change_problems(409)
 )
 def examine_clocks(body: ClocksRequest, store: StoreNeeded) -> list[dict[str, Any]]:
     """Takes of one wearing are judged together. A repair keeps the take's id, and can be undone. A reference

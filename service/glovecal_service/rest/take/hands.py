@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import math
+from typing import Annotated
 
 from fastapi import APIRouter
 from pydantic import Field
 
 from glovecal_models.takes.hand_clocks import HandAlignment, TakeClock, align
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_models.takes.text import alignment_sentence
+from glovecal_service.request_types import StrictBody, TakeReference
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.request_types import StrictBody, TakeReference
+from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.take.answer import HandAlignmentView, OwnClockView
 from glovecal_service.store.store import Store
-from glovecal_service.views.hand_alignment import HandAlignmentView, hand_alignment_view
+
+
+def _view(found: HandAlignment, clocks: tuple[TakeClock, TakeClock]) -> HandAlignmentView:
+    """What is not known is None."""
+    own = [None if clock.own is None else OwnClockView.model_validate(clock.own) for clock in clocks]
+    known = {name: getattr(found, name) for name in ("how", "shift_s", "at_s")}
+    return HandAlignmentView(
+        **known,
+        drift_ppm=1e6 * found.drift,
+        sd_s=None if math.isnan(found.sd_s) else found.sd_s,
+        own_clocks=own,
+        sentence=alignment_sentence(found, clocks),
+    )
+
 
 router = APIRouter(prefix="/takes/hands", tags=["takes"])
 
@@ -25,9 +41,9 @@ class HandsRequest(StrictBody):
 @router.post(
     "", response_model=HandAlignmentView, summary="Clocks of two hands", responses=change_problems(409)
 )
-def examine_hands(body: HandsRequest, store: StoreNeeded) -> dict[str, Any]:
+def examine_hands(body: HandsRequest, store: StoreNeeded) -> HandAlignmentView:
     """By one capture computer, a time code, or wall clocks, as the takes' accounting says; or by claps."""
-    return hand_alignment_view(*hand_alignment(store, body.takes[0], body.takes[1], claps=body.claps))
+    return _view(*hand_alignment(store, body.takes[0], body.takes[1], claps=body.claps))
 
 
 def hand_alignment(

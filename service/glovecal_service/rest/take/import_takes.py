@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.takes.angles_on_a_circle import unwrapped
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_warnings import alike_once, take_warnings
+from glovecal_models.takes.take_check import alike_once, take_warnings
 from glovecal_service.store.errors import Conflict, DamagedRows
+from glovecal_service.store.list_part import ListPart
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.store import Store
 
@@ -54,12 +56,14 @@ def import_takes(
     layout: str | None,
     create_subject: bool = False,
     replace: bool = False,
+    facts: Mapping[str, Any] | None = None,
 ) -> Import:
     """Keep all takes that ``read`` finds. Without ``layout`` the file's columns make one.
 
     A file that another subject has already is refused: one recording is of one hand. With ``create_subject``
     a subject that is not there is added with the takes. With ``replace`` a take whose frames are here already
-    gets what this file says beside them, and keeps its id; else that is a Conflict. Raises BadInput
+    gets what this file says beside them, and keeps its id; else that is a Conflict. New takes keep ``facts``.
+    Raises BadInput
     (BadTakeTable, LayoutMismatch), NotFound, Conflict, StorageFull; then nothing was imported, and no subject
     added.
     """
@@ -100,6 +104,7 @@ def import_takes(
             layout=chosen.name,
             source="import",
             original_sha256=original_sha256,
+            facts=facts,
         )
         undo.pop_all()
     for take in circle.takes:
@@ -137,7 +142,7 @@ def _newest_measured(store: Store, records: Sequence[TakeRecord], new: Sequence[
 
 def _require_no_other_owner(store: Store, original_sha256: str, subject: str) -> None:
     try:
-        every = store.takes.list()
+        every = store.takes.list(part=ListPart(text=original_sha256))
     except DamagedRows as error:  # a damaged row of anyone must not end all imports
         every = error.sound
     for record in every:

@@ -13,17 +13,17 @@ from starlette.background import BackgroundTask
 
 from glovecal_client.operating_system import name_for_a_file
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.handedness import Handedness
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.exports.motion_file import Body as BodyFile
 from glovecal_service.exports.motion_file import HandTake, MotionFile, write_motion
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
-from glovecal_service.rest.http.request_types import ModelReference, StrictBody, TakeReference, Title
+from glovecal_service.rest.http.problem import change_problems
 from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])

@@ -10,22 +10,19 @@ from typing import Annotated, Any, Literal
 import anyio.to_thread
 import numpy as np
 from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, Field
 
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.angles_on_a_circle import unwrapped
-from glovecal_models.takes.camera_reference.camera_reference import CAMERA_PATCHES, reference_from_camera
-from glovecal_models.takes.camera_reference.estimates import read_estimates
+from glovecal_models.takes.camera_estimates import read_estimates
+from glovecal_models.takes.camera_reference import CAMERA_PATCHES, reference_from_camera
 from glovecal_models.takes.table import read_reference
-from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.problem import Problem, change_problems
 from glovecal_service.rest.http.request_types import IdInPath
-from glovecal_service.rest.take.takes import Take
+from glovecal_service.rest.take.answer import CameraReferenceView, Take
 from glovecal_service.rest.take.uploads import TABLE_BODY, FileName, file_name, keep_table
 from glovecal_service.store.records import TakeRecord
 from glovecal_service.store.takes import CAMERA_REFERENCE, UNWRAPPED
-from glovecal_service.views.camera_range import CameraRangeView, camera_range_views
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 ESTIMATES_BODY: dict[str, Any] = {
@@ -101,15 +98,6 @@ def _on_take_clock(time_s: np.ndarray, clock: ReferenceClock, record: TakeRecord
     return time_s - float(offset)
 
 
-class CameraReferenceView(BaseModel):
-    take: Take
-    clock_offset_s: float = Field(description="Camera time less glove time; the reference is moved by it.")
-    clock_offset_sd_s: float = Field(description="Its standard deviation.")
-    accepted_share: float = Field(description="Of the camera's estimates.")
-    camera_ranges: list[CameraRangeView] = Field(description="Angles outside of them are not judged.")
-    sentences: list[str]
-
-
 @router.put(
     "/{id}/camera-reference",
     response_model=CameraReferenceView,
@@ -128,7 +116,7 @@ async def put_camera_reference(
         float, Query(gt=0, le=30.0, description="How far it is searched on both sides.")
     ] = 3.0,
     filename: FileName = "estimates.npz",
-) -> dict[str, Any]:
+) -> CameraReferenceView:
     """The body is a file of a camera's estimates (.npz). Its clock is found by the movement, and only what
     the camera accepted becomes the reference, each angle with its standard deviation. The reference that was
     there stays on file; where the clock is not found nothing is changed."""
@@ -143,7 +131,7 @@ async def put_camera_reference(
 
 def _attach_camera(
     parts: Parts, id: str, named: tuple[str, Path], search: tuple[float, float]
-) -> dict[str, Any]:
+) -> CameraReferenceView:
     with parts.uploads.under_names(named) as (path,):
         estimates = read_estimates(path)
     take = parts.store.takes.load(id)
@@ -156,11 +144,9 @@ def _attach_camera(
         id, seen.reference_time_s, seen.rotations, seen.reference,
         reference_sd=seen.reference_sd, context=patches, facts={CAMERA_REFERENCE: document},
     )  # fmt: skip
-    return {
-        "take": record,
-        "clock_offset_s": document["clock_offset_s"],
-        "clock_offset_sd_s": document["clock_offset_sd_s"],
-        "accepted_share": document["accepted_share"],
-        "camera_ranges": camera_range_views(found.ranges),
-        "sentences": found.sentences(),
-    }
+    return CameraReferenceView(
+        **{name: document[name] for name in ("clock_offset_s", "clock_offset_sd_s", "accepted_share")},
+        take=Take.model_validate(record, from_attributes=True),
+        camera_ranges=list(found.ranges),
+        sentences=found.sentences(),
+    )

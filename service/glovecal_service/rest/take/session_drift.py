@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter
 from pydantic import Field
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.handedness import Handedness
-from glovecal_models.takes.session_drift import END, SHAPES, START, session_drift
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_models.hand.rotations import Handedness
+from glovecal_models.takes.session_drift import END, SHAPES, START, SessionDrift, session_drift
+from glovecal_models.takes.text import drift_sentence
+from glovecal_service.request_types import StrictBody, SubjectName, WearingName
 from glovecal_service.rest.http.dependencies import PartsNeeded
-from glovecal_service.rest.http.request_types import StrictBody, SubjectName, WearingName
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.take.answer import SessionDriftView
 from glovecal_service.store.records import TakeRecord
-from glovecal_service.views.session_drift import SessionDriftView, session_drift_view
+
+
+def _view(found: SessionDrift) -> SessionDriftView:
+    turned = zip(found.rotations, found.common_deg.tolist(), strict=True) if found.rotations else ()
+    return SessionDriftView(
+        shapes=list(found.shapes),
+        rms_deg=found.rms_deg,
+        mean_deg=dict(turned),
+        mean_counts=dict(zip(found.sensors, found.common_counts.tolist(), strict=True)),
+        left_out=dict(found.left_out),
+        sentence=drift_sentence(found),
+    )
+
 
 router = APIRouter(prefix="/takes/session-drift", tags=["takes"])
 
@@ -34,7 +48,7 @@ def get_shapes() -> dict[str, str]:
 @router.post(
     "", response_model=SessionDriftView, summary="Drift of a session", responses=change_problems(409)
 )
-def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> dict[str, Any]:
+def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> SessionDriftView:
     """Takes named `start-SHAPE` and `end-SHAPE`, the newest of each; angles by the model that is active."""
     records = [take for take in parts.store.takes.list(body.subject) if take.is_of(body.hand)]
     wearings = (
@@ -57,9 +71,9 @@ def examine_session(body: SessionDriftRequest, parts: PartsNeeded) -> dict[str, 
         for sequence in (start, end)
     )
     if predictor is None:
-        return session_drift_view(session_drift(first, last, None))
+        return _view(session_drift(first, last, None))
     with parts.predictors.one_at_a_time:
-        return session_drift_view(session_drift(first, last, predictor))
+        return _view(session_drift(first, last, predictor))
 
 
 def _sequence(records: list[TakeRecord], wearing: str, place: str) -> dict[str, TakeRecord]:

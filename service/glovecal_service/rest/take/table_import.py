@@ -1,51 +1,61 @@
-"""``POST takes``: a take table is imported, all takes of the file or none."""
+"""A table is imported, all takes of the file or none; before that it is shown what would be made of it."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import anyio.to_thread
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
+from glovecal_models.takes.answer import ColumnMapping, TablePreview
 from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.table_preview import preview_table
 from glovecal_models.takes.take import Take as TakeArrays
-from glovecal_service.rest.http.answers import change_problems
+from glovecal_service.plain import document_of, read
+from glovecal_service.request_types import IDENTIFIER, SHA256, SubjectName, WearingName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.problem import Problem
-from glovecal_service.rest.http.request_types import IDENTIFIER, SHA256, SubjectName, WearingName
+from glovecal_service.rest.http.problem import Problem, change_problems
+from glovecal_service.rest.take.answer import ImportedTakes
 from glovecal_service.rest.take.import_takes import Import, import_takes
-from glovecal_service.rest.take.takes import Take
-from glovecal_service.rest.take.uploads import TABLE_BODY, FileName, TableFormat, file_name, keep_table
+from glovecal_service.rest.take.uploads import (
+    FILE_NAME,
+    LONGEST_FILE_NAME,
+    TABLE_BODY,
+    FileName,
+    TableFormat,
+    file_name,
+    keep_table,
+)
+from glovecal_service.store.list_part import ListPart
+from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 
-
-class ImportedTakes(BaseModel):
-    takes: list[Take] = Field(description="All takes of the file, in its order.")
-    imported: list[str] = Field(description="Ids of those that are new.")
-    existing: list[str] = Field(description="Ids of those that the same file had brought before.")
-    replaced: list[str] = Field(description="Ids of those whose reference and names are now the file's.")
-    layout: str
-    original_sha256: str
-    warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
-    subject_created: bool = Field(description="Whether the subject was not there before.")
+READ_AS = "read_as"
+"""In a take's facts: the shape of the table it came from, and how that was read."""
 
 
-class ImportOptions(BaseModel):
-    """Query parameters of an import."""
+class ImportedAs(BaseModel):
+    """Whose takes they are, and how they are called."""
 
     subject: SubjectName
     create_subject: bool = Field(False, description="Add the subject if it is not there; else 404.")
     layout: str | None = Field(None, pattern=IDENTIFIER, description="None: made of the file's columns.")
-    format: TableFormat | None = Field(None, description="None: by the file's first bytes and name.")
     name: WearingName | None = Field(None, description="Name of the take; before the names of several.")
     wearing: WearingName | None = Field(None, description="The wearing, where the file does not say it.")
     equal_times: Literal["refuse", "spread"] = Field("refuse", description="Frames stamped in batches.")
     replace: bool = Field(
         False, description="Takes whose frames are here get the file's reference and names; else 409."
     )
+
+
+class ImportOptions(ImportedAs):
+    """Query parameters of an import."""
+
+    format: TableFormat | None = Field(None, description="None: by the file's first bytes and name.")
     reference_upload: str | None = Field(
         None, pattern=SHA256, description="A reference table sent before to `uploads`."
     )
@@ -77,12 +87,90 @@ async def add_takes(
     upload = await keep_table(request, parts)
     files = [(file_name(filename, options.format), upload.path)]
     if options.reference_upload is not None:
-        found = parts.uploads.find(options.reference_upload)
-        if found is None:
-            raise Problem(404, "not-found", f"there is no upload {options.reference_upload}")
-        files.append((file_name(reference_filename, None), found))
+        files.append((file_name(reference_filename, None), _kept(parts, options.reference_upload)))
+    return await _imported(parts, response, files, upload.sha256, options)
+
+
+class UploadedTable(BaseModel):
+    """A table that was sent to `uploads`."""
+
+    model_config = ConfigDict(extra="forbid")  # strict would take no list as columns
+
+    upload: str = Field(pattern=SHA256)
+    filename: str = Field(
+        pattern=FILE_NAME, max_length=LONGEST_FILE_NAME, description="What the user calls it."
+    )
+    mapping: ColumnMapping | None = Field(
+        None,
+        description="How it is read. None: as a take table, else as it was guessed or kept.",
+    )
+    wearing: WearingName | None = Field(None, description="The wearing, where the file does not say it.")
+
+
+class ImportedUpload(ImportedAs, UploadedTable):
+    pass
+
+
+@router.post(
+    "/preview",
+    response_model=TablePreview,
+    summary="What a table would become",
+    responses=change_problems(),
+)
+async def preview(body: UploadedTable, parts: PartsNeeded) -> TablePreview:
+    """Nothing is imported. A table of a shape that was imported before is read as it was then; 422 for what
+    is no table of numbers."""
+    path = _kept(parts, body.upload)
+
+    def look() -> TablePreview:
+        with parts.uploads.under_names((body.filename, path)) as [named]:
+            return preview_table(
+                named, body.mapping, wearing=body.wearing, kept=partial(_mapping_kept, parts.store)
+            )
+
+    return await anyio.to_thread.run_sync(look, limiter=parts.import_slots)
+
+
+@router.post(
+    "/import",
+    status_code=201,
+    response_model=ImportedTakes,
+    summary="Import a table as its preview showed it",
+    responses=change_problems(409)
+    | {200: {"model": ImportedTakes, "description": "Every take of this file was here already."}},
+)
+async def import_upload(body: ImportedUpload, response: Response, parts: PartsNeeded) -> dict[str, Any]:
+    """As `POST /v1/takes` does with a take table. How it was read is kept for the next file of its shape."""
+    files = [(body.filename, _kept(parts, body.upload))]
+    return await _imported(parts, response, files, body.upload, body, body.mapping)
+
+
+def _kept(parts: Parts, upload: str) -> Path:
+    found = parts.uploads.find(upload)
+    if found is None:
+        raise Problem(404, "not-found", f"there is no upload {upload}")
+    return found
+
+
+def _mapping_kept(store: Store, shape: str) -> ColumnMapping | None:
+    """As a table of this shape was read last."""
+    for record in store.takes.list(part=ListPart(reverse=True, text=shape)):
+        kept = record.facts.get(READ_AS)
+        if kept is not None and kept["shape"] == shape:
+            return read(ColumnMapping, kept["mapping"])
+    return None
+
+
+async def _imported(
+    parts: Parts,
+    response: Response,
+    files: list[tuple[str, Path]],
+    original_sha256: str,
+    options: ImportedAs,
+    mapping: ColumnMapping | None = None,
+) -> dict[str, Any]:
     result = await anyio.to_thread.run_sync(
-        _import, parts, files, upload.sha256, options, limiter=parts.import_slots
+        _import, parts, files, original_sha256, options, mapping, limiter=parts.import_slots
     )
     parts.metrics.imported_takes.inc(len(result.imported))
     response.status_code = 201 if result.imported or result.replaced else 200
@@ -92,28 +180,37 @@ async def add_takes(
         "existing": sorted(result.existing),
         "replaced": sorted(result.replaced),
         "layout": result.layout,
-        "original_sha256": upload.sha256,
+        "original_sha256": original_sha256,
         "subject_created": result.subject_created,
         "warnings": result.warnings,
     }
 
 
 def _import(
-    parts: Parts, files: list[tuple[str, Path]], original_sha256: str, options: ImportOptions
+    parts: Parts,
+    files: list[tuple[str, Path]],
+    original_sha256: str,
+    options: ImportedAs,
+    mapping: ColumnMapping | None,
 ) -> Import:
+    facts = None
+    if mapping is not None:
+        facts = {READ_AS: {"shape": mapping.shape, "mapping": document_of(mapping)}}
     with parts.uploads.under_names(*files) as paths:
 
-        def read() -> list[TakeArrays]:
+        def takes() -> list[TakeArrays]:
             return read_takes(
-                *paths, name=options.name, wearing=options.wearing, equal_times=options.equal_times
-            )
+                *paths, name=options.name, wearing=options.wearing, equal_times=options.equal_times,
+                mapping=mapping,
+            )  # fmt: skip
 
         return import_takes(
             parts.store,
-            read,
+            takes,
             original_sha256=original_sha256,
             subject=options.subject,
             layout=options.layout,
             create_subject=options.create_subject,
             replace=options.replace,
+            facts=facts,
         )

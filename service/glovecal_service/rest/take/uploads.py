@@ -6,12 +6,11 @@ from pathlib import PurePosixPath
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, Field
 
-from glovecal_service.rest.http.answers import change_problems
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.problem import Problem, change_problems
 from glovecal_service.rest.http.upload_folder import Upload
+from glovecal_service.rest.take.answer import UploadedFile
 
 router = APIRouter(prefix="/uploads", tags=["takes"])
 
@@ -20,10 +19,11 @@ MEDIA_TYPES: dict[TableFormat, str] = {"csv": "text/csv", "parquet": "applicatio
 ACCEPTED = (*MEDIA_TYPES.values(), "application/octet-stream")
 LONGEST_FILE_NAME = 200
 
+FILE_NAME = r"^[^./\\\x00-\x1f\x7f][^/\\\x00-\x1f\x7f]*$"
 FileName = Annotated[
     str,
     Query(
-        pattern=r"^[^./\\\x00-\x1f\x7f][^/\\\x00-\x1f\x7f]*$",
+        pattern=FILE_NAME,
         max_length=LONGEST_FILE_NAME,
         description="What the user calls the file: errors say it, an unnamed take is named after it.",
     ),
@@ -60,11 +60,6 @@ def file_name(name: str, table_format: TableFormat | None) -> str:
     if len(name.encode("utf-8", "replace")) > LONGEST_FILE_NAME + 10:
         raise Problem(422, "invalid-request", "the file name is too long; give at most 200 bytes")
     return name
-
-
-class UploadedFile(BaseModel):
-    sha256: str = Field(description="The name to give where an upload is asked for.")
-    size: int = Field(description="Bytes.")
 
 
 @router.post(

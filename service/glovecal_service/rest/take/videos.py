@@ -9,59 +9,30 @@ from typing import Annotated
 import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi import Path as InPath
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from glovecal_client.pictures.preview import MOST_PICTURES
+from glovecal_client.pictures.video_file import MOST_PICTURES
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import completed
 from glovecal_service.exports.hand_motion import at_times
-from glovecal_service.exports.take_motion import motion_of
+from glovecal_service.exports.motion_file import motion_of
 from glovecal_service.plain import plain
-from glovecal_service.rest.http.answers import change_problems, problems
+from glovecal_service.request_types import SHA256_PREFIX, Sha256, StrictBody
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.request_types import (
-    SHA256_PREFIX,
-    IdInPath,
-    Sha256,
-    StrictBody,
-    SubjectFilter,
-)
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
+from glovecal_service.rest.take.answer import HandBeside, Video
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import TakeRecord
-from glovecal_service.store.videos import VideoFacts, check_preview
+from glovecal_service.store.take_file import VideoFacts, check_preview
 
 router = APIRouter(prefix="/videos", tags=["takes"])
 
 ALWAYS_THE_SAME = "private, max-age=3600"
 
 
-class Video(BaseModel):
-    take: str = Field(description="Id.")
-    name: str
-    source: str
-    simulated: bool = Field(description="Its pictures were drawn, not taken.")
-    times_s: list[float] = Field(description="Of each picture, by the take's clock.")
-    sentence: str
-
-    @classmethod
-    def of(cls, take: TakeRecord, facts: VideoFacts) -> Video:
-        drawn = "drawn" if facts.simulated else f"of {facts.source}"
-        seconds = facts.times_s[-1] - facts.times_s[0]
-        return cls(
-            take=take.id, name=take.name, source=facts.source, simulated=facts.simulated,
-            times_s=facts.times_s, sentence=f"{len(facts.times_s)} pictures {drawn}, {seconds:.1f} s.",
-        )  # fmt: skip
-
-
 class Attached(StrictBody):
     upload: Sha256 = Field(description="A preview sent to `uploads`, as `glovecal record --video` makes it.")
-
-
-class HandBeside(BaseModel):
-    rotations: list[str]
-    degrees: list[list[float] | None] = Field(
-        description="Of the whole hand at each picture; null where the take has no frame within 0.1 s."
-    )
 
 
 @router.get("", response_model=list[Video], summary="Takes with a video", responses=problems())
@@ -72,7 +43,7 @@ def list_videos(parts: PartsNeeded, subject: SubjectFilter = None) -> list[Video
     for row in reversed(parts.store.takes.list(subject=subject)):
         if row.id in known:
             with suppress(BadInput):
-                found.append(Video.of(row, parts.videos.facts(row.id)))
+                found.append(_video(row, parts.videos.facts(row.id)))
     return found
 
 
@@ -84,6 +55,15 @@ def put_video(id: IdInPath, body: Attached, parts: PartsNeeded) -> Video:
     if upload is None:
         raise NotFound(f"no upload {body.upload[:12]}; send the preview to /v1/uploads first")
     return attach_preview(parts, take, upload)
+
+
+def _video(take: TakeRecord, facts: VideoFacts) -> Video:
+    drawn = "drawn" if facts.simulated else f"of {facts.source}"
+    seconds = facts.times_s[-1] - facts.times_s[0]
+    return Video(
+        take=take.id, name=take.name, source=facts.source, simulated=facts.simulated,
+        times_s=facts.times_s, sentence=f"{len(facts.times_s)} pictures {drawn}, {seconds:.1f} s.",
+    )  # fmt: skip
 
 
 def attach_preview(parts: Parts, take: TakeRecord, preview: Path) -> Video:
@@ -102,12 +82,12 @@ def attach_preview(parts: Parts, take: TakeRecord, preview: Path) -> Video:
             f"{take.name!r} from {time_s[0]:.1f} to {time_s[-1]:.1f} s: no moment in common"
         )
     parts.videos.attach(take.id, preview)
-    return Video.of(take, facts)
+    return _video(take, facts)
 
 
 @router.get("/{id}", response_model=Video, summary="A take's video", responses=problems())
 def get_video(id: IdInPath, parts: PartsNeeded) -> Video:
-    return Video.of(parts.store.takes.get(id), parts.videos.facts(id))
+    return _video(parts.store.takes.get(id), parts.videos.facts(id))
 
 
 @router.get(

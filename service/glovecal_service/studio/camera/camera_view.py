@@ -14,12 +14,11 @@ class CameraView(Element, component="camera_view.js"):
 
     def __init__(self, glove: str) -> None:
         super().__init__()
-        self._props["address"] = f"{ROOT}/cameras/{quote(glove)}/picture"
-        self._props["label"] = f"Picture of camera {glove}"
-        self._props["live"] = False
+        address = f"{ROOT}/cameras/{quote(glove)}/picture"
+        self._props.update(address=address, label=f"Picture of camera {glove}", live=False)
 
     def follow(self, live: bool) -> None:
         """Whether there are pictures to ask for."""
         if self._props["live"] != live:
-            self._props["live"] = live
+            self._props.update(live=live)
             self.update()

@@ -27,7 +27,7 @@ export default {
             ...(next ? [{ value: last, itemStyle: { color: "transparent", borderColor: blue, borderType: "dashed", borderWidth: 2 } }] : []),
           ],
           label: {
-            show: true, position: "insideTop", fontWeight: 650, color: shades.onBar,
+            show: true, position: "insideTop", fontWeight: 650, color: shades.onBar, fontSize: step < 80 ? 10 : 12,
             formatter: ({ dataIndex }) => (isTall(dataIndex) ? degrees(steps[dataIndex].rmse_deg) : ""),
           },
         },
@@ -77,12 +77,17 @@ export default {
         ...(floor ? [{ name: `noise floor ${degrees(floor.floor_deg)}, 95 % ${floor.low_deg.toFixed(2)} to ${degrees(floor.high_deg)}`, kind: "band", colour: green }] : []),
         ...(next ? [{ name: "being made", kind: "dashed", colour: blue }] : []),
       ];
+      const longest = (texts) => 7 * Math.max(...texts.map((text) => text.length));
+      const isTight = longest(names.flatMap((name) => name.split(/\s+/))) > step; // a word has no room beside others
+      const below = isTight ? Math.min(150, 24 + 0.6 * longest(names)) : longest(names) > step ? 62 : 32;
       this.chart.setOption({
         animationDuration: 300, textStyle: { color: shades.ink },
-        grid: { left: 58, right: 16, top: 24, bottom: names.some((name) => 7 * name.length > step) ? 62 : 32 },
+        grid: { left: 58, right: 16, top: 24, bottom: below },
         xAxis: {
           type: "category", data: names, axisTick: { show: false }, axisLine: { lineStyle: { color: shades.quiet } },
-          axisLabel: { interval: 0, color: shades.ink, fontSize: step < 80 ? 11 : 12, width: Math.max(40, step - 2), overflow: "break", lineHeight: 15 },
+          axisLabel: { interval: 0, color: shades.ink, fontSize: step < 80 ? 11 : 12, lineHeight: 15,
+            ...(isTight ? { rotate: 50, width: 170, overflow: "truncate" } : { width: Math.max(40, step - 2), overflow: "break" }),
+          },
         },
         yAxis: axis(shades, { name: "error (RMSE), degrees", nameLocation: "middle", nameGap: 38, min: 0 }),
         series,

@@ -114,12 +114,12 @@ export default {
       this.draw();
       this.read();
     },
-    resized() { this.putCursors(); },
+    resized() { this.draw(); },
     draw() {
       if (!this.lines) return;
       const shades = colours();
       this.series = seriesOf(this.lines, shades);
-      const option = overTime(this, shades, (points) => this.tip(points));
+      const option = overTime(this, shades, this.chart.getWidth(), (points) => this.tip(points));
       this.chart.setOption(option, { replaceMerge: ["series"] });
       this.$nextTick(() => this.putCursors());
     },

@@ -8,7 +8,8 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.studio.charts.column_chart import ColumnChart
+from glovecal_models.comparison.series.answer import ResidualColumn
+from glovecal_service.studio.charts.chart import ColumnChart
 from glovecal_service.studio.service import Refusal, Service
 
 
@@ -33,8 +34,8 @@ class ErrorAgainstColumn:
         """``body``: takes and the rotation."""
         self._asked = (model, body)
         try:
-            answer = await self._service.post(
-                f"/models/{model}/residual", {**body, "column": self.column or "angle"}
+            answer = await self._service.ask(
+                ResidualColumn, f"/models/{model}/residual", {**body, "column": self.column or "angle"}
             )
         except Refusal as refusal:
             self._sentence.set_text(str(refusal))
@@ -45,12 +46,12 @@ class ErrorAgainstColumn:
             return
         if self._asked != (model, body):
             return
-        names = {one["name"]: one["phrase"][:1].upper() + one["phrase"][1:] for one in answer["columns"]}
-        self._shown = answer["column"]["name"]
+        names = {one.name: one.phrase[:1].upper() + one.phrase[1:] for one in answer.columns}
+        self._shown = answer.column.name
         self._select.set_options(names, value=self._shown)
         self._chart.show(answer)
         self._sentence.set_text(
-            f"{answer['sentence']} The band is what 95 % of the same errors, shifted in time, reach."
+            f"{answer.sentence} The band is what 95 % of the same errors, shifted in time, reach."
         )
 
     async def _choose(self, event: ValueChangeEventArguments) -> None:

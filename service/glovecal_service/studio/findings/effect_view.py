@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.studio.charts.effect_chart import EffectChart
+from glovecal_service.rest.effect.answer import EffectPictureView
+from glovecal_service.studio.charts.chart import EffectChart
 from glovecal_service.studio.service import Refusal, Service
 
 
@@ -43,36 +43,25 @@ class EffectView:
 
     async def show(self, rotation: str | None) -> None:
         """None: the rotation with the largest error."""
-        body = self._body | {"rotation": rotation}
+        body, picture = self._body | {"rotation": rotation}, "/models/{}/effect-picture"
         try:
-            before = await self._service.post(f"/models/{self._before}/effect-picture", body)
+            before = await self._service.ask(EffectPictureView, picture.format(self._before), body)
             after = None
             if self._after is not None:
-                body = self._body | {"rotation": before["rotation"]}
-                after = await self._service.post(f"/models/{self._after}/effect-picture", body)
+                body = self._body | {"rotation": before.rotation}
+                after = await self._service.ask(EffectPictureView, picture.format(self._after), body)
         except Refusal as refusal:
             self._sentence.set_text(f"No picture: {refusal}")
             return
-        self._shown = before["rotation"]
-        self._select.set_options(before["rotations"], value=self._shown)
-        self._select.set_visibility(len(before["rotations"]) > 1)
-        has_picture = bool(before["series"])
+        self._shown = before.rotation
+        self._select.set_options(before.rotations, value=self._shown)
+        self._select.set_visibility(len(before.rotations) > 1)
+        has_picture = bool(before.series)
         self._chart.set_visibility(has_picture)
         if has_picture:
             self._chart.show(before, after)
-        self._sentence.set_text(before["sentence"])
+        self._sentence.set_text(before.sentence)
 
     async def _choose(self, event: ValueChangeEventArguments) -> None:
         if event.value and event.value != self._shown:
             await self.show(str(event.value))
-
-
-def clearest_rotation(found: Mapping[str, Any], effect: str, where: Sequence[str]) -> str | None:
-    """Of ``where`` that of which the effect saves the largest share. None: unknown.
-
-    ``found``: a diagnosis.
-    """
-    own = next((each for each in found["candidates"] if each["effect"] == effect), None)
-    shares = {} if own is None else own["saved_share"]
-    known = [name for name in where if name in found["rotations"]]
-    return max(known, key=lambda name: shares.get(name) or 0.0) if known else None

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from nicegui import ui
+
+from glovecal_service.rest.effect.answer import SchematicView
 
 WIDTH, HEIGHT, LOOP_WIDTH = 210, 96, 96
 ROOM = 6
 
 
-def schematic_view(name: str, answer: Mapping[str, Any]) -> None:
-    """``answer`` of ``GET /v1/effects/{name}/schematic``: over time, and with the effect against without."""
-    time, without, with_it = (answer[key] for key in ("time_s", "without", "with_effect"))
+def schematic_view(name: str, answer: SchematicView) -> None:
+    """Over time, and with the effect against without."""
+    time, without, with_it = answer.time_s, answer.without, answer.with_effect
     known = [value for values in (without, with_it) for value in values if value is not None]
     with ui.element("div").classes("schematic"):
         with ui.element("figure"):
-            with _drawing(WIDTH, f"{answer['label']} with {name} and without, over time"):
+            with _drawing(WIDTH, f"{answer.label} with {name} and without, over time"):
                 _line(time, without, (time[0], time[-1]), known, WIDTH, "schematic-without")
                 _line(time, with_it, (time[0], time[-1]), known, WIDTH, "schematic-with")
             with ui.element("figcaption"):
-                ui.label(f"{answer['label']} over {answer['time_label']}")
+                ui.label(f"{answer.label} over {answer.time_label}")
         with ui.element("figure"):
             across = [value for value in without if value is not None]
-            with _drawing(LOOP_WIDTH, f"{answer['label']} with {name} against without"):
+            with _drawing(LOOP_WIDTH, f"{answer.label} with {name} against without"):
                 span = (min(across), max(across))
                 _line(without, without, span, known, LOOP_WIDTH, "schematic-without")
                 _line(without, with_it, span, known, LOOP_WIDTH, "schematic-loop")

@@ -52,8 +52,7 @@ class Board(Element, component="board.js", esm={"glovecal-guide": "esm"}):
         """``keys``: by act, as browsers name them. One that is held down acts once."""
         super().__init__()
         self._last: tuple[dict[str, Any], float | None] = ({}, None)
-        self._props["keys"] = {act: list(each) for act, each in keys.items()}
-        self._props["label"] = label
+        self._props.update(keys={act: list(each) for act, each in keys.items()}, label=label)
         self.show(shown)
 
     def show(self, shown: Shown, motion: Motion | None = None) -> None:
@@ -67,7 +66,7 @@ class Board(Element, component="board.js", esm={"glovecal-guide": "esm"}):
             self._last = before, left
             return
         self._last = state, left
-        self._props["state"] = {**state, "left_s": left}
+        self._props.update(state={**state, "left_s": left})
         self.update()
 
     def on_act(self, act: Callable[[str], Any]) -> None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Refusal, Service
+from glovecal_service.rest.subject.answer import SkeletonView, Subject
+from glovecal_service.studio.heading import act, heading
+from glovecal_service.studio.service import Service, refusals
 
 THUMB = "T"
 THUMB_TURN = math.radians(38.0)
@@ -30,7 +30,7 @@ class DimensionsForm:
         self._subject = ""
 
     async def build(self) -> None:
-        names = [each["name"] for each in await self._service.get("/subjects")]
+        names = [each.name for each in await self._service.read(list[Subject], "/subjects")]
         if not names:
             return
         self._subject = names[0]
@@ -50,8 +50,8 @@ class DimensionsForm:
         await self._show()
 
     async def _show(self) -> None:
-        skeleton = await self._service.get(f"/subjects/{quote(self._subject)}/skeleton")
-        sizes, measured = skeleton["dimensions"]["sizes"], skeleton["dimensions"]["measured"]
+        skeleton = await self._service.read(SkeletonView, f"/subjects/{quote(self._subject)}/skeleton")
+        sizes, measured = skeleton.dimensions.sizes, skeleton.dimensions.measured
         self._shown.clear()
         with self._shown:
             _picture(skeleton, list(sizes))
@@ -63,25 +63,20 @@ class DimensionsForm:
                             f"{number}  {name}, mm", value=round(size, 1) if name in measured else None,
                             placeholder=f"{size:.1f} by scale", min=1, max=400, step=0.1,
                         ).props("stack-label dense")  # fmt: skip
-                ui.button("Save", on_click=lambda: self._save(skeleton["hand"], fields)).props(
-                    "outline no-caps"
-                ).classes("studio-target")
-                ui.label("Empty: follows from hand_length.")
+                act("Save", lambda: self._save(skeleton.hand, fields))
+                ui.label("Leave empty to estimate it from the hand's length.")
 
     async def _save(self, hand: str, fields: Mapping[str, ui.number]) -> None:
         sizes = {name: float(field.value) for name, field in fields.items() if field.value}
-        try:
+        with refusals(self._told.set_text):
             await self._service.put(
                 f"/subjects/{quote(self._subject)}/hand", {"dimensions": sizes, "hand": hand}
             )
-        except Refusal as refusal:
-            self._told.set_text(str(refusal))
-            return
-        self._told.set_text("Saved.")
-        await self._show()
+            self._told.set_text("Saved.")
+            await self._show()
 
 
-def _picture(skeleton: Mapping[str, Any], names: list[str]) -> None:
+def _picture(skeleton: SkeletonView, names: list[str]) -> None:
     """The back of the hand; each measure has the number of its field."""
     lines = _lines(skeleton)
     ends = [point for begin, end in lines.values() for point in (begin, end)]
@@ -104,17 +99,17 @@ def _picture(skeleton: Mapping[str, Any], names: list[str]) -> None:
             dot.props["r"] = "6"
 
 
-def _lines(skeleton: Mapping[str, Any]) -> dict[str, tuple[Point, Point]]:
+def _lines(skeleton: SkeletonView) -> dict[str, tuple[Point, Point]]:
     """Begin and end of each measure, the fingers straight."""
-    joints = {each["name"]: each for each in skeleton["joints"]}
-    sizes = skeleton["dimensions"]["sizes"]
-    side = 1.0 if joints["I_ABD"]["offset"][1] > 0 else -1.0
+    joints = {each.name: each for each in skeleton.joints}
+    sizes = skeleton.dimensions.sizes
+    side = 1.0 if joints["I_ABD"].offset[1] > 0 else -1.0
     lines: dict[str, tuple[Point, Point]] = {}
     for finger in dict.fromkeys(name[0] for name in sizes if not name.startswith("hand_")):
         bones = [name for name in sizes if name.startswith(f"{finger}_")]
         turn = THUMB_TURN if finger == THUMB else 0.0
-        first = next(each for each in joints.values() if each["name"].startswith(f"{finger}_"))
-        root = _on_page(first["offset"])
+        first = next(each for each in joints.values() if each.name.startswith(f"{finger}_"))
+        root = _on_page(first.offset)
         at = root if finger == THUMB else (0.0, 0.0)
         for bone in bones:
             length = sizes[bone]

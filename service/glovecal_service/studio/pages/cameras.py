@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from nicegui import ui
 
-from glovecal_service.studio.heading import heading
+from glovecal_service.rest.glove.answer import CameraView
+from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.camera_card import STAGES, CameraCard
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
@@ -31,7 +29,7 @@ def add(studio: Studio) -> None:
 
     @page("/cameras")
     async def cameras() -> None:
-        with shell(studio, "cameras", "Cameras"):
+        async with shell(studio, "cameras", "Cameras"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/camera.css">')
             await CamerasPage(studio).build()
@@ -63,34 +61,26 @@ class CamerasPage:
                 self._glove = ui.input("Name of the glove", value="colour-glove").classes("choice")
                 self._stage = ui.select(list(STAGES), value="dense", label="Stage").classes("choice")
                 self._keep = ui.select(KEPT, value="labels", label="Keep").classes("choice")
-            ui.button("Start", on_click=self._start).props("unelevated no-caps color=indigo-8").classes(
-                "studio-main-act"
-            )
+            main_act("Start", self._start)
 
     async def _start(self) -> None:
         body = {
             "source": self._source.value, "glove": str(self._glove.value).strip(),
             "stage": self._stage.value, "keep": self._keep.value,
         }  # fmt: skip
-        try:
+        with refusals(warn_long):
             await self._studio.service.post("/cameras", body)
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning", timeout=10_000)
-            return
-        await self._look()
+            await self._look()
 
     async def _look(self) -> None:
-        try:
-            found: list[Mapping[str, Any]] = await self._studio.service.get("/cameras")
-        except Refusal as refusal:
-            self._notice.set_text(str(refusal))
-            return
-        self._notice.set_text("" if found else "No camera is on.")
-        here = {each["glove"]: each for each in found}
-        for gone in self._cards.keys() - here.keys():
-            self._cards.pop(gone).delete()
-        for glove, camera in here.items():
-            if glove not in self._cards:
-                with self._cameras:
-                    self._cards[glove] = CameraCard(self._studio, glove)
-            self._cards[glove].show(camera)
+        with refusals(self._notice.set_text):
+            found = await self._studio.service.read(list[CameraView], "/cameras")
+            self._notice.set_text("" if found else "No camera is on.")
+            here = {each.glove: each for each in found}
+            for gone in self._cards.keys() - here.keys():
+                self._cards.pop(gone).delete()
+            for glove, camera in here.items():
+                if glove not in self._cards:
+                    with self._cameras:
+                        self._cards[glove] = CameraCard(self._studio, glove)
+                self._cards[glove].show(camera)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 from nicegui import ui
+from pydantic import ValidationError
 
+from glovecal_models.diagnosis.answer import MissingEffects
+from glovecal_models.improvement.answer import Improved
+from glovecal_service.plain import read
+from glovecal_service.rest.glove.answer import Gloves
+from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.sampling.answer import SamplingView
+from glovecal_service.studio.next_steps import connect_or_try
 from glovecal_service.studio.pages.capture_recording import RecordingPage
 from glovecal_service.studio.pages.capture_sampling import SamplingPage
 from glovecal_service.studio.pages.capture_session import SessionPage
 from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
@@ -20,6 +28,11 @@ MODES = {
     "wearing": "New wearing",
     "session": "Session",
 }
+PROPOSING: dict[str, type[MissingEffects] | type[Improved]] = {
+    "diagnose": MissingEffects,
+    "improve": Improved,
+}
+"""Jobs that may want a take."""
 AGAIN_EVERY_S = 2.0
 
 
@@ -29,7 +42,7 @@ def add(studio: Studio) -> None:
     @page("/capture")
     async def capture(mode: str = "", sampling: str = "", proposal: str = "") -> None:
         wanted = mode if mode in MODES else "recording" if proposal else "sampling"
-        with shell(studio, "capture", "Capture"):
+        async with shell(studio, "capture", "Capture"):
             await CapturePage(studio, wanted).build(sampling, proposal)
 
 
@@ -47,11 +60,12 @@ class CapturePage:
                 if mode == self._mode:
                     link.props('aria-current="true"')
         self._main = ui.element("div").classes("capture")
-        gloves = (await self._studio.service.get("/gloves"))["seen"]
+        gloves = (await self._studio.service.read(Gloves, "/gloves")).seen
         if not gloves:
             ui.label("No glove was seen yet. Run: glovecal capture --device DEVICE --glove NAME").classes(
                 "studio-notice"
             )
+            connect_or_try()
             ui.timer(AGAIN_EVERY_S, self._again)
             return
         with self._main:
@@ -68,39 +82,40 @@ class CapturePage:
             form = WearingForm if self._mode == "wearing" else SamplingForm
             await form(self._studio, gloves, self._started).build()
 
-    async def _started(self, view: dict[str, Any]) -> None:
-        ui.navigate.history.replace(f"?mode={self._mode}&sampling={view['id']}")
+    async def _started(self, view: SamplingView) -> None:
+        ui.navigate.history.replace(f"?mode={self._mode}&sampling={view.id}")
         self._main.clear()
         with self._main:
             await SamplingPage(self._studio, view).build()
 
-    async def _open_sampling(self, wanted: str) -> dict[str, Any] | None:
+    async def _open_sampling(self, wanted: str) -> SamplingView | None:
         """``wanted``, else the newest that goes on."""
         if wanted:
-            try:
-                return await self._studio.service.get(f"/sampling/{wanted}")
-            except Refusal as refusal:
-                ui.notify(str(refusal), type="warning")
-        found = await self._studio.service.get("/sampling", only_open=True)
+            with refusals():
+                return await self._studio.service.read(SamplingView, f"/sampling/{wanted}")
+        found = await self._studio.service.read(list[SamplingView], "/sampling", only_open=True)
         for other in found[1:]:
             ui.link(
-                f"Also going on: {other['subject']} with {other['glove']}",
-                f"/capture?sampling={other['id']}",
+                f"Also going on: {other.subject} with {other.glove}",
+                f"/capture?sampling={other.id}",
             ).classes("studio-link")
         return found[0] if found else None
 
-    async def _proposed(self, job: str) -> dict[str, Any] | None:
+    async def _proposed(self, job: str) -> MissingEffects | Improved | None:
         """What a diagnosis wants to be recorded next, with its subject."""
         if not job:
             return None
         try:
-            found = await self._studio.service.get(f"/jobs/{job}")
+            found = await self._studio.service.read(Job, f"/jobs/{job}")
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning")
             return None
-        take = (found["result"] or {}).get("next_take")
-        return None if take is None else {**take, "subject": found["subject"]}
+        try:
+            answered = read(PROPOSING[found.kind], found.result)
+        except (KeyError, ValidationError):  # another kind's, or of another version
+            return None
+        return None if answered.next_take is None else replace(answered, subject=found.subject)
 
     async def _again(self) -> None:
-        if (await self._studio.service.get("/gloves"))["seen"]:
+        if (await self._studio.service.read(Gloves, "/gloves")).seen:
             ui.navigate.reload()

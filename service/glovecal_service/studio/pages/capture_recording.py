@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
 from nicegui import ui
 
+from glovecal_models.diagnosis.answer import MissingEffects
+from glovecal_models.improvement.answer import Improved
+from glovecal_service.rest.glove.answer import Film, GloveView, Recording
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
-from glovecal_service.studio.heading import heading
+from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
 from glovecal_service.studio.pages.take_reference import TakeReference
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.2
@@ -37,32 +40,38 @@ OPEN = ("requested", "recording", "stopping")
 class RecordingPage:
     """One open page. A recording that goes on is taken up again after a reload."""
 
-    def __init__(self, studio: Studio, gloves: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(self, studio: Studio, gloves: Sequence[GloveView]) -> None:
         self._studio = studio
         self._worn = GloveAndWearer(studio, gloves)
-        self._recording: dict[str, Any] | None = None
-        self._proposed: Mapping[str, Any] = {}
+        self._recording: Recording | None = None
+        self._ask = ""
+        """What a diagnosis asks the wearer to do."""
         self._films = False
         """A video goes on that was begun here."""
         self._filmed = ""
 
-    async def build(self, proposed: Mapping[str, Any] | None) -> None:
-        self._proposed = proposed or {}
+    async def build(self, proposing: MissingEffects | Improved | None) -> None:
+        """``proposing``: a diagnosis, or an improvement's last, that wants something to be recorded."""
+        wanted = None if proposing is None else proposing.next_take
+        self._ask = "" if wanted is None else wanted.what
         with ui.element("section").classes("card capture-form").props('aria-label="Recording"'):
-            if proposed:
+            if wanted is not None:
                 with ui.element("div").classes("capture-proposal"):
-                    heading(2, f"What the diagnosis wants to be recorded: {proposed['seconds']} s")
-                    ui.label(proposed["what"])
-                    if proposed["separates"]:
-                        ui.label(f"It decides between {', '.join(proposed['separates'])}.")
+                    heading(2, f"What the diagnosis wants to be recorded: {wanted.seconds} s")
+                    ui.label(wanted.what)
+                    if wanted.separates:
+                        ui.label(f"It decides between {', '.join(wanted.separates)}.")
             else:
                 heading(2, "Record a take")
-            await self._worn.build((proposed or {}).get("subject"))
+            await self._worn.build(None if proposing is None else proposing.subject)
             with ui.element("div").classes("capture-fields"):
-                wanted = proposed.get("take_name", "deciding") if proposed else _free_name()
-                self._name = ui.input("Name of the take", value=wanted).classes("choice")
+                name = _free_name() if wanted is None else wanted.take_name
+                self._name = ui.input("Name of the take", value=name).classes("choice")
                 self._seconds = ui.number(
-                    "Stop after, s (empty: by key)", value=self._proposed.get("seconds"), min=1, max=LONGEST_S
+                    "Stop after, s (empty: by key)",
+                    value=None if wanted is None else wanted.seconds,
+                    min=1,
+                    max=LONGEST_S,
                 ).classes("capture-number")
                 self._pre_roll = ui.number(
                     "Pre-roll, s", value=PRE_ROLL_S, min=0, max=LONGEST_PRE_ROLL_S
@@ -72,11 +81,7 @@ class RecordingPage:
         self._board = Board(WAITING, keys={"main": MAIN_KEYS}, label="What happens now")
         self._board.on_act(self._act)
         with ui.element("div").classes("capture-acts"):
-            self._main = (
-                ui.button("Start recording", on_click=partial(self._act, "main"))
-                .props("unelevated no-caps color=indigo-8 size=lg")
-                .classes("studio-main-act")
-            )
+            self._main = main_act("Start recording", partial(self._act, "main"), large=True)
         self._account = ui.element("div").classes("findings").props('aria-live="polite"')
         self._reference = TakeReference(self._studio)
         await self._reference.build()
@@ -84,19 +89,17 @@ class RecordingPage:
         self._timer = ui.timer(EVERY_S, self._look)
         self._show()
 
-    async def _going_on(self) -> dict[str, Any] | None:
-        found = await self._studio.service.get("/recordings", only_open=True)
-        return next((each for each in found if not each["name"].startswith(OF_A_SAMPLING)), None)
+    async def _going_on(self) -> Recording | None:
+        found = await self._studio.service.read(list[Recording], "/recordings", only_open=True)
+        return next((each for each in found if not each.name.startswith(OF_A_SAMPLING)), None)
 
     async def _act(self, act: str) -> None:
-        try:
-            if self._recording is None or self._recording["state"] not in OPEN:
+        with refusals(warn_long):
+            if self._recording is None or self._recording.state not in OPEN:
                 await self._start()
-            elif self._recording["state"] != "stopping":
-                stopped = f"/recordings/{self._recording['id']}/stop"
-                self._recording = await self._studio.service.post(stopped)
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning", timeout=10_000)
+            elif self._recording.state != "stopping":
+                stopped = f"/recordings/{self._recording.id}/stop"
+                self._recording = await self._studio.service.ask(Recording, stopped)
         self._show()
 
     async def _start(self) -> None:
@@ -105,15 +108,14 @@ class RecordingPage:
         if self._film.value:
             await self._studio.service.post("/films", {"source": self._film.value})
             self._films = True
-        body = {
+        body: dict[str, Any] = {
             "glove": self._worn.glove,
             "name": str(self._name.value).strip(),
             "subject": self._worn.subject,
         }
         try:
-            self._recording = await self._studio.service.post(
-                "/recordings", body | {"lead_s": self._pre_roll.value or 0}
-            )
+            body |= {"lead_s": self._pre_roll.value or 0}
+            self._recording = await self._studio.service.ask(Recording, "/recordings", body)
         except Refusal:
             if self._films:
                 self._films = False
@@ -123,25 +125,22 @@ class RecordingPage:
     async def _look(self) -> None:
         """Nothing is asked while nothing is recorded."""
         before = self._recording
-        if before is None or before["state"] not in (*OPEN, "repairing"):
+        if before is None or before.state not in (*OPEN, "repairing"):
             return
-        try:
-            now = await self._studio.service.get(f"/recordings/{before['id']}")
+        with refusals():
+            now = await self._studio.service.read(Recording, f"/recordings/{before.id}")
             self._filmed = await self._film_line()
             limit = self._seconds.value
-            if now["state"] == "recording" and limit and _seconds(now) >= limit:
-                now = await self._studio.service.post(f"/recordings/{now['id']}/stop")
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")
-            return
-        self._recording = now
-        self._show()
-        if (now["state"], now["facts"]) != (before["state"], before["facts"]):
-            await self._tell(now)
+            if now.state == "recording" and limit and _seconds(now) >= limit:
+                now = await self._studio.service.ask(Recording, f"/recordings/{now.id}/stop")
+            self._recording = now
+            self._show()
+            if (now.state, now.facts) != (before.state, before.facts):
+                await self._tell(now)
 
     def _show(self) -> None:
         recording = self._recording
-        state = recording["state"] if recording else ""
+        state = recording.state if recording else ""
         self._main.set_text("Stop" if state in ("requested", "recording") else "Start recording")
         self._main.set_enabled(state != "stopping")
         if recording is None or state not in OPEN:
@@ -149,63 +148,63 @@ class RecordingPage:
             shown = Shown(
                 "waiting",
                 "Press Space to start.",
-                ask=self._proposed.get("what") or READY,
+                ask=self._ask or READY,
                 number=2 if recording else 0,
                 tone=tone,
             )
             self._board.show(shown)
             return
         seconds, limit = _seconds(recording), self._seconds.value
-        frames = recording["facts"].get("recorded")
+        frames = recording.account.recorded
         line = {"requested": "Beginning.", "stopping": "Ending."}.get(
             state, "Recording. Press Space to stop."
         )
         is_on = state == "recording"
         shown = Shown(
-            phase=state, line=line, ask=self._proposed.get("what") or f"{seconds:.0f} s",
+            phase=state, line=line, ask=self._ask or f"{seconds:.0f} s",
             note="" if frames is None else f"{frames} frames{self._filmed}", number=1 if is_on else 0,
             tone="begin" if is_on else "", of_s=limit or None,
             left_s=max(0.0, limit - seconds) if limit else None,
         )  # fmt: skip
         self._board.show(shown)
 
-    async def _tell(self, recording: Mapping[str, Any]) -> None:
+    async def _tell(self, recording: Recording) -> None:
         """What became of the frames, once the recording is over."""
-        facts = recording["facts"]
-        if recording["state"] in OPEN:
+        account = recording.account
+        if recording.state in OPEN:
             return
         self._account.clear()
         if str(self._name.value).startswith(FREE):
             self._name.set_value(_free_name())
         with self._account, ui.element("section").classes("finding"):
-            heading(2, f"{recording['name']}: {recording['state']}")
-            if "recorded" in facts:
-                pre_roll = facts.get("pre_roll") or {}
-                ui.label(f"Pre-roll: {pre_roll.get('seconds', 0):.0f} s before the start.")
-            if facts.get("sentence"):
-                ui.label(facts["sentence"])
+            heading(2, f"{recording.name}: {recording.state}")
+            if account.recorded is not None:
+                ui.label(f"Pre-roll: {account.pre_roll.seconds:.0f} s before the start.")
+            if account.sentence:
+                ui.label(account.sentence)
             if self._films:
-                await self._tell_video(facts.get("take"))
-            if facts.get("take"):
-                ui.label(f"Take {facts['take']}.").classes("version-id")
-                await self._reference.choose(facts["take"])
+                await self._tell_video(account.take)
+            if account.take:
+                ui.label(f"Take {account.take}.").classes("version-id")
+                await self._reference.choose(account.take)
 
     async def _film_line(self) -> str:
         if not self._films:
             return ""
-        film = await self._studio.service.get("/films")
-        return f", {film['pictures']} pictures" + ("" if film["is_on"] else "; the camera is lost")
+        film = await self._studio.service.read(Film, "/films")
+        return f", {film.pictures} pictures" + ("" if film.is_on else "; the camera is lost")
 
     async def _tell_video(self, take: str | None) -> None:
         """End it, and show it beside the take."""
         self._films = False
         try:
-            film = await self._studio.service.post("/films/stop", {"takes": [take] if take else []})
+            body = {"takes": [take] if take else []}
+            film = await self._studio.service.ask(Film, "/films/stop", body)
         except Refusal as refusal:
             ui.label(str(refusal)).classes("studio-notice")
             return
-        ui.label(f"Video {film['file']}: {film['pictures']} pictures, in the service's folder films.")
-        for sentence in (film["problem"], *film["sentences"]):
+        ui.label(f"Video {film.file}: {film.pictures} pictures, in the service's folder films.")
+        for sentence in (film.problem, *film.sentences):
             if sentence:
                 ui.label(sentence)
 
@@ -214,6 +213,6 @@ def _free_name() -> str:
     return f"{FREE}{datetime.now():%H%M%S}"
 
 
-def _seconds(recording: Mapping[str, Any]) -> float:
+def _seconds(recording: Recording) -> float:
     """Since it was asked for."""
-    return max(0.0, (datetime.now(UTC) - datetime.fromisoformat(recording["requested_at"])).total_seconds())
+    return max(0.0, (datetime.now(UTC) - recording.requested_at).total_seconds())

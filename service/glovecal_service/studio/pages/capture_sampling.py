@@ -16,8 +16,10 @@ from nicegui import ui
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
+from glovecal_service.rest.sampling.answer import SamplingView, StepDone, TargetView
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Motion, Shown, Tone
-from glovecal_service.studio.hand.hand_view import HandView, Side
+from glovecal_service.studio.hand.hand_view import SIDES, HandView, side_buttons
+from glovecal_service.studio.heading import quiet_act
 from glovecal_service.studio.pages.capture_end import SamplingEnd
 from glovecal_service.studio.pages.capture_start import show_keys
 from glovecal_service.studio.service import Refusal
@@ -34,12 +36,6 @@ KEYS = {
     "skip": ("s",),
     "pause": ("p",),
 }
-SIDES: tuple[tuple[Side, str], ...] = (
-    ("corner", "Corner"),
-    ("back", "Back"),
-    ("palm", "Palm"),
-    ("side", "Side"),
-)
 TONES: dict[str, Tone] = {"recording": "begin", "lost": "lost", "done": "done"}
 OUTCOMES = {"good": "good", "bad": "not good", "skipped": "skipped"}
 
@@ -50,10 +46,10 @@ _followers: dict[str, set[str]] = defaultdict(set)
 class SamplingPage:
     """One open page."""
 
-    def __init__(self, studio: Studio, view: dict[str, Any]) -> None:
+    def __init__(self, studio: Studio, view: SamplingView) -> None:
         self._studio = studio
         self._view = view
-        self._path = f"/sampling/{view['id']}"
+        self._path = f"/sampling/{view.id}"
         self._target = ""
         self._listed: list[Any] = []
         self._ended = False
@@ -62,12 +58,12 @@ class SamplingPage:
     async def build(self) -> None:
         view = self._view
         self._live = ui.element("div").classes("capture-live")
-        if not view["open"]:
+        if not view.open:
             await self._end()
             return
         with self._live:
             with ui.row().classes("capture-head"):
-                ui.label(f"{view['subject']}, glove {view['glove']}").classes("capture-who")
+                ui.label(f"{view.subject}, glove {view.glove}").classes("capture-who")
                 self._word = ui.label("").classes("state-word").props('role="status"')
                 self._place = ui.label("").classes("capture-place")
             self._bar = ui.linear_progress(0.0, show_value=False, size="10px").props(
@@ -96,16 +92,14 @@ class SamplingPage:
             self._button("Undo", "U", "undo")
             self._button("Skip", "S", "skip")
             self._pause = self._button("Pause", "P", "pause")
-            ui.button("Stop", on_click=self._ask_to_stop).props("flat no-caps").classes("studio-target")
+            quiet_act("Stop", self._ask_to_stop)
         with ui.dialog().props('aria-label="Stop the sampling"') as self._stopping, ui.card():
             ui.label("Stop now? Steps that are done become takes; the rest cannot be added later.")
             with ui.row():
                 ui.button("Stop", on_click=partial(self._stop)).props(
                     "unelevated no-caps color=red-9"
                 ).classes("studio-main-act")
-                ui.button("Go on sampling", on_click=self._stopping.close).props("flat no-caps").classes(
-                    "studio-target"
-                )
+                quiet_act("Go on sampling", self._stopping.close)
 
     def _button(self, name: str, key: str, act: str, props: str = "outline no-caps") -> ui.button:
         button = ui.button(name, on_click=partial(self._act, act)).props(props)
@@ -118,29 +112,25 @@ class SamplingPage:
 
     async def _hand(self) -> None:
         view = self._view
-        skeleton = await self._studio.service.get(f"/subjects/{quote(view['subject'])}/skeleton")
+        skeleton = await self._studio.service.get(f"/subjects/{quote(view.subject)}/skeleton")
         with ui.element("div").classes("capture-hand"):
             self._hand_view = HandView(
                 skeleton,
                 label="The target hand, and your own hand live",
-                feed=f"/studio/feed/{quote(view['glove'])}",
+                feed=f"/studio/feed/{quote(view.glove)}",
                 empty="",
                 seen_from="corner",
             ).classes("capture-view")
             with ui.element("div").classes("capture-legend"):
                 ui.label("Target").classes("legend legend-target")
                 self._own = ui.label("Your hand, live").classes("legend legend-live")
-            with ui.row().classes("glove-sides"):
-                for side, name in SIDES:
-                    ui.button(name, on_click=partial(self._hand_view.look, side)).props(
-                        "outline no-caps"
-                    ).classes("studio-target")
+            side_buttons(self._hand_view, sides=("corner", *SIDES))
 
     # What goes on
 
     async def _look(self) -> None:
         try:
-            self._view = await self._studio.service.get(self._path)
+            self._view = await self._studio.service.read(SamplingView, self._path)
         except Refusal as refusal:
             self._problem.set_text(f"The service does not tell how it goes on: {refusal}")
             return
@@ -148,23 +138,21 @@ class SamplingPage:
 
     async def _show(self) -> None:
         view = self._view
-        if not view["open"]:
+        if not view.open:
             await self._end()
             return
-        motion = Motion(view["steadiness_percent"], view["still_percent"])
-        self._board.show(
-            self._shown(), motion if view["phase"] not in ("done", "stopped", "choosing") else None
-        )
-        done = sum(step["outcome"] in ("good", "skipped") for step in view["steps"])
-        count = "" if view["protocol"] == ACTIVE else f" of {len(view['steps'])}"
+        motion = Motion(view.steadiness_percent, view.still_percent)
+        self._board.show(self._shown(), motion if view.phase not in ("done", "stopped", "choosing") else None)
+        done = sum(step.outcome in ("good", "skipped") for step in view.steps)
+        count = "" if view.protocol == ACTIVE else f" of {len(view.steps)}"
         self._place.set_text(
-            f"{done}{count} steps done, {view['capture_s']:.0f} s"
-            + ("" if view["protocol"] == ACTIVE else f" of about {view['capture_of_s']:.0f} s")
+            f"{done}{count} steps done, {view.capture_s:.0f} s"
+            + ("" if view.protocol == ACTIVE else f" of about {view.capture_of_s:.0f} s")
         )
-        self._bar.set_visibility(view["protocol"] != ACTIVE)  # nobody knows how many it will ask
-        self._bar.set_value(round(done / len(view["steps"]), 3))
+        self._bar.set_visibility(view.protocol != ACTIVE)  # nobody knows how many it will ask
+        self._bar.set_value(round(done / len(view.steps), 3))
         self._problem.set_text(self._trouble())
-        tabs = len(_followers[view["id"]])
+        tabs = len(_followers[view.id])
         self._others.set_text(
             "" if tabs < 2 else f"{tabs} pages show this sampling. Each can drive it; all stay in step."
         )
@@ -172,95 +160,100 @@ class SamplingPage:
         self._main.set_text(
             {"go": "Start", "again": "Repeat", "resume": "Go on"}.get(self._main_act(), "Start")
         )
-        self._pause.set_enabled(view["phase"] not in ("paused", "done", "stopped"))
+        self._pause.set_enabled(view.phase not in ("paused", "done", "stopped"))
         self._list_steps()
         await self._show_target()
 
     def _trouble(self) -> str:
         view = self._view
-        overdue = view["phase_of_s"] is not None and view["phase_s"] > view["phase_of_s"] + OVERDUE_S
-        if view["problem"] or not overdue or view["phase"] == "judged":
-            return view["problem"]
+        overdue = view.phase_of_s is not None and view.phase_s > view.phase_of_s + OVERDUE_S
+        if view.problem or not overdue or view.phase == "judged":
+            return view.problem
         return "No answer from the recorder. The sampling goes on by itself once it is back; nothing is lost."
 
     async def _show_target(self) -> None:
-        name = self._view["step"]["name"] if self._view["step"] else ""
+        name = self._view.step.name if self._view.step else ""
         if name == self._target:
             return
         self._target = name
         with suppress(Refusal):
-            self._hand_view.ghost((await self._studio.service.get(f"{self._path}/target"))["hands"])
+            target = await self._studio.service.read(TargetView, f"{self._path}/target")
+            self._hand_view.ghost(target.hands)
 
     def _shown(self) -> Shown:
         view = self._view
-        step, phase = view["step"] or {}, view["phase"]
-        outcome = next((each for each in view["steps"] if each["name"] == step.get("name")), None)
-        bad = phase == "judged" and outcome is not None and outcome["outcome"] == "bad"
-        left = None if view["phase_of_s"] is None else max(0.0, view["phase_of_s"] - view["phase_s"])
+        step, phase = view.step, view.phase
+        outcome = self._outcome
+        bad = phase == "judged" and outcome is not None and outcome.outcome == "bad"
+        left = None if view.phase_of_s is None else max(0.0, view.phase_of_s - view.phase_s)
         tone: Tone = ("bad" if bad else "good") if phase == "judged" else TONES.get(phase, "")
-        ask = step.get("ask", "")
+        ask, needs = (step.ask, step.needs) if step else ("", "")
         return Shown(
             phase="bad" if bad else "good" if phase == "judged" else phase,
             line=self._line(bad, left),
             ask=ask or {"choosing": "One moment"}.get(phase, ""),
             note=self._note(ask),
-            needs=f"You need {step['needs']}." if step.get("needs", "") not in ask else "",
-            why=" ".join(outcome["reasons"]) if bad and outcome is not None else "",
-            last=self._last_result(step.get("name", "")),
-            number=view["say_number"],
+            needs=f"You need {needs}." if needs not in ask else "",
+            why=" ".join(outcome.reasons) if bad and outcome is not None else "",
+            last=self._last_result(step.name if step else ""),
+            number=view.say_number,
             tone=tone,
-            of_s=view["phase_of_s"] if phase != "judged" or bad else None,
+            of_s=view.phase_of_s if phase != "judged" or bad else None,
             left_s=left,
-            wants="motion" if step.get("motion") == "move" else "still",
+            wants="motion" if step and step.motion == "move" else "still",
         )
+
+    @property
+    def _outcome(self) -> StepDone | None:
+        """What became of the step at hand."""
+        step = self._view.step
+        return next((each for each in self._view.steps if step and each.name == step.name), None)
 
     def _note(self, ask: str) -> str:
         """Which step it is; before it begins also what led here, such as that the signal is back."""
         view = self._view
-        if view["step"] is None:
+        if view.step is None:
             return ""
-        if view["phase"] == "waiting" and view["say"].endswith(ask):
-            return view["say"].removesuffix(ask).strip()
-        return f"Step {view['step']['place']}" + (
-            "." if view["protocol"] == ACTIVE else f" of {len(view['steps'])}."
-        )
+        if view.phase == "waiting" and view.say.endswith(ask):
+            return view.say.removesuffix(ask).strip()
+        return f"Step {view.step.place}" + ("." if view.protocol == ACTIVE else f" of {len(view.steps)}.")
 
     def _line(self, bad: bool, left: float | None) -> str:
         view = self._view
-        step = view["step"] or {}
-        by_hand = view["trigger"] == "still" and step.get("motion") == "hold" and not step.get("needs")
-        if view["phase"] == "judged":
-            again = "Press Space to repeat" if view["trigger"] == "key" else "It is repeated by itself"
+        step = view.step
+        by_hand = view.trigger == "still" and step and step.motion == "hold" and not step.needs
+        if view.phase == "judged":
+            again = "Press Space to repeat" if view.trigger == "key" else "It is repeated by itself"
             return f"Not good. {again}." if bad else "Good."
-        if view["phase"] == "waiting":
-            if view["trigger"] == "timer":
+        if view.phase == "waiting":
+            if view.trigger == "timer":
                 return "Starts by itself."
             return (
                 "Take the pose and keep still: it starts by itself." if by_hand else "Press Space when ready."
             )
-        if view["phase"] == "countdown" and left == 0.0:
+        if view.phase == "countdown" and left == 0.0:
             return "Waiting for the recording to begin."
-        if view["phase"] == "recording":
-            return "Now move." if step.get("motion") == "move" else "Hold still."
+        if view.phase == "recording":
+            return "Now move." if step and step.motion == "move" else "Hold still."
         return {
             "countdown": "Get ready.",
             "settling": "Keep still.",
             "lost": "Signal lost. Waiting for the glove; then this step is repeated.",
             "paused": "Paused. Press Space to go on.",
             "choosing": "Choosing the next step.",
-        }.get(view["phase"], "Done. Storing the takes.")
+        }.get(view.phase, "Done. Storing the takes.")
 
     def _last_result(self, now: str) -> str:
         """Of the step before this one."""
-        told = [each for each in self._view["steps"] if each["outcome"] and each["name"] != now]
-        if not told or self._view["phase"] not in ("waiting", "countdown", "choosing", "paused"):
+        told = [each for each in self._view.steps if each.outcome and each.name != now]
+        if not told or self._view.phase not in ("waiting", "countdown", "choosing", "paused"):
             return ""
         last = told[-1]
-        why = f" {' '.join(last['reasons'])}" if last["outcome"] == "bad" else ""
-        return f"Before: {last['name']}, {OUTCOMES[last['outcome']]}.{why}"
+        why = f" {' '.join(last.reasons)}" if last.outcome == "bad" else ""
+        return f"Before: {last.name}, {OUTCOMES[last.outcome]}.{why}"
 
     def _list_steps(self) -> None:
-        told = [each for each in self._view["steps"] if each["outcome"]]
+        told = [each for each in self._view.steps if each.outcome]
         if told == self._listed:
             return
         self._listed = told
@@ -268,28 +261,26 @@ class SamplingPage:
         with self._steps:
             for each in told:
                 with ui.element("li").classes("capture-step"):
-                    ui.label(each["name"]).classes("capture-step-name")
-                    ui.label(OUTCOMES[each["outcome"]]).classes("step-word").props(
-                        f'data-outcome="{each["outcome"]}"'
+                    ui.label(each.name).classes("capture-step-name")
+                    ui.label(OUTCOMES[each.outcome]).classes("step-word").props(
+                        f'data-outcome="{each.outcome}"'
                     )
-                    ui.label(" ".join(each["reasons"])).classes("capture-step-why")
-                    again = ui.button("Redo", on_click=partial(self._send, "redo", each["name"]))
+                    ui.label(" ".join(each.reasons)).classes("capture-step-why")
+                    again = ui.button("Redo", on_click=partial(self._send, "redo", each.name))
                     again.props("flat no-caps").classes("studio-target")
-                    again.props["aria-label"] = f"Redo {each['name']}"
+                    again.props["aria-label"] = f"Redo {each.name}"
 
     # What the wearer wants
 
     def _main_act(self) -> str:
         """What Space means now: "go", "again", "resume", or "" where it means nothing."""
-        phase = self._view["phase"]
+        phase = self._view.phase
         if phase == "judged":
-            name = (self._view["step"] or {}).get("name")
-            is_bad = any(each["name"] == name and each["outcome"] == "bad" for each in self._view["steps"])
-            return "again" if is_bad else ""
+            return "again" if self._outcome and self._outcome.outcome == "bad" else ""
         return {"waiting": "go", "paused": "resume"}.get(phase, "")
 
     async def _act(self, act: str) -> None:
-        if act == "pause" and self._view["phase"] == "paused":
+        if act == "pause" and self._view.phase == "paused":
             act = "main"
         if act == "main":
             act = {"again": "go"}.get(self._main_act(), self._main_act())
@@ -299,7 +290,7 @@ class SamplingPage:
     async def _send(self, event: str, step: str | None = None) -> None:
         try:
             body = {} if step is None else {"step": step}
-            self._view = await self._studio.service.post(f"{self._path}/{event}", body)
+            self._view = await self._studio.service.ask(SamplingView, f"{self._path}/{event}", body)
         except Refusal as refusal:
             # Two presses of a pedal, or of two pages: the first has done it.
             if event not in ("go", "resume"):
@@ -318,7 +309,7 @@ class SamplingPage:
 
     async def _say_state(self) -> None:
         try:
-            state = (await run_in_threadpool(self._studio.feeds.states)).get(self._view["glove"])
+            state = (await run_in_threadpool(self._studio.feeds.states)).get(self._view.glove)
         except ClientError as error:
             self._problem.set_text(f"The real-time process does not answer: {error}")
             return
@@ -334,7 +325,7 @@ class SamplingPage:
             )  # fmt: skip
 
     def _follow_together(self) -> None:
-        client, pages = ui.context.client, _followers[self._view["id"]]
+        client, pages = ui.context.client, _followers[self._view.id]
         pages.add(client.id)
         client.on_connect(lambda: pages.add(client.id))
         client.on_disconnect(lambda: pages.discard(client.id))

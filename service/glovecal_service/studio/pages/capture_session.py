@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 from nicegui import ui
 
+from glovecal_service.rest.glove.answer import Card, GloveAnswers, Gloves, LiveGlove, Recording
+from glovecal_service.rest.take.answer import SessionDriftView
 from glovecal_service.studio.heading import heading
-from glovecal_service.studio.pages.glove_and_wearer import hand_of
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import table, text_row
@@ -63,22 +64,20 @@ class SessionPage:
     async def _look(self) -> None:
         """The warm-up of each glove."""
         try:
-            live = await self._studio.service.get("/live-gloves")
+            live = await self._studio.service.read(list[LiveGlove], "/live-gloves")
         except Refusal as refusal:
             live, said = [], str(refusal)
         else:
             said = "No glove streams."
-        self._gloves = [each["glove"] for each in live if each["on_for_s"] is not None][:MOST_GLOVES]
+        self._gloves = [each.glove for each in live if each.on_for_s is not None][:MOST_GLOVES]
         self._warm.clear()
         with self._warm:
             if not live:
                 ui.label(said)
             for each in live:
                 ui.label(_warm_line(each))
-                for warning in each["warnings"]:
-                    ui.label(f"{each['glove']}: {warning['sentence']} {warning['advice']}").classes(
-                        "studio-notice"
-                    )
+                for warning in each.warnings:
+                    ui.label(f"{each.glove}: {warning.sentence} {warning.advice}").classes("studio-notice")
 
     async def _command(self, do: str) -> None:
         if self._is_busy or not self._gloves:
@@ -87,7 +86,7 @@ class SessionPage:
         argument = str(self._file.value).strip() if do == "start" else ""
         try:
             body = {"gloves": self._gloves, "do": do, "argument": argument}
-            found = await self._studio.service.post("/glove-commands", body)
+            found = await self._studio.service.ask(GloveAnswers, "/glove-commands", body)
         except Refusal as refusal:
             ui.notify(str(refusal), type="warning", timeout=10_000)
             return
@@ -95,15 +94,15 @@ class SessionPage:
             self._is_busy = False
         self._cards.clear()
         with self._cards:
-            known = [each for each in found["answers"] if each["answer"]]
+            known = [each for each in found.answers if each.answer]
             if known:
                 with table("What the gloves answered", COLUMNS):
                     for each in known:
-                        text_row(*_row(each))
-            for each in found["answers"]:
-                if each["problem"]:
-                    ui.label(f"{each['glove']}: {each['problem']}").classes("studio-notice")
-            for sentence in found["sentences"]:
+                        text_row(*_row(each.glove, each.card))
+            for each in found.answers:
+                if each.problem:
+                    ui.label(f"{each.glove}: {each.problem}").classes("studio-notice")
+            for sentence in found.sentences:
                 ui.label(sentence)
 
     async def _sequence(self, place: str) -> None:
@@ -119,12 +118,12 @@ class SessionPage:
                 started = []
                 for glove in self._gloves:
                     body = {"glove": glove, "name": f"{place}-{shape}", "lead_s": 0}
-                    started.append(await self._studio.service.post("/recordings", body))
+                    started.append(await self._studio.service.ask(Recording, "/recordings", body))
                 self._ask.set_text(f"{ask} Hold it, {HELD_S:.0f} s.")
                 await asyncio.sleep(HELD_S)
                 for each in started:
-                    stopped = await self._studio.service.post(f"/recordings/{each['id']}/stop")
-                    worn += [(stopped["subject"], stopped["glove"])] if stopped["subject"] else []
+                    stopped = await self._studio.service.ask(Recording, f"/recordings/{each.id}/stop")
+                    worn += [(stopped.subject, stopped.glove)] if stopped.subject else []
             self._ask.set_text(f"The {len(self._shapes)} shapes are recorded.")
         except Refusal as refusal:
             self._ask.set_text(f"Stopped: {refusal}")
@@ -138,14 +137,13 @@ class SessionPage:
     async def _tell_drift(self, worn: Sequence[tuple[str, str]]) -> None:
         """``worn``: each subject with a glove."""
         self._drift.clear()
-        seen = {each["name"]: each for each in (await self._studio.service.get("/gloves"))["seen"]}
+        seen = {each.name: each for each in (await self._studio.service.read(Gloves, "/gloves")).seen}
         for subject, glove in worn:
-            hand = hand_of(seen[glove])
+            hand = seen[glove].known_hand
             try:
-                found = await self._studio.service.post(
-                    "/takes/session-drift", {"subject": subject, "hand": hand}
-                )
-                said = found["sentence"]
+                body = {"subject": subject, "hand": hand}
+                found = await self._studio.service.ask(SessionDriftView, "/takes/session-drift", body)
+                said = found.sentence
             except Refusal as refusal:
                 said = str(refusal)
             with self._drift:
@@ -156,26 +154,23 @@ def _act(name: str, do: Any) -> None:
     ui.button(name, on_click=do).props("outline no-caps color=indigo-8")
 
 
-def _warm_line(each: Mapping[str, Any]) -> str:
-    on_for, left = each["on_for_s"], each["warm_up_left_s"]
+def _warm_line(each: LiveGlove) -> str:
+    on_for, left = each.on_for_s, each.warm_up_left_s
     if on_for is None:
-        return f"{each['glove']}: its capture does not answer."
+        return f"{each.glove}: its capture does not answer."
     if not left:
-        return f"{each['glove']}: warm, captured for {on_for / 60:.0f} minutes."
-    return (
-        f"{each['glove']}: not warm yet, {left / 60:.0f} of {WARM_UP_MIN} minutes left; readings will drift."
-    )
+        return f"{each.glove}: warm, captured for {on_for / 60:.0f} minutes."
+    return f"{each.glove}: not warm yet, {left / 60:.0f} of {WARM_UP_MIN} minutes left; readings will drift."
 
 
-def _row(each: Mapping[str, Any]) -> tuple[str, ...]:
-    answer, clock = each["answer"], each["answer"].get("clock") or {}
-    volts, free = answer.get("battery_v"), answer.get("free_mb")
+def _row(glove: str, card: Card) -> tuple[str, ...]:
+    clock = card.clock
     return (
-        each["glove"],
-        "–" if volts is None else f"{volts:.2f} V",
-        f"{1e3 * clock['ahead_s']:+.1f} ms" if clock else "–",
-        f"{1e3 * clock['sd_s']:.1f} ms" if clock else "–",
-        answer.get("active_file") or "–",
-        ", ".join(answer.get("files") or ()) or "–",
-        "–" if free is None else f"{free} MB",
+        glove,
+        "–" if card.battery_v is None else f"{card.battery_v:.2f} V",
+        f"{1e3 * clock.ahead_s:+.1f} ms" if clock else "–",
+        f"{1e3 * clock.sd_s:.1f} ms" if clock else "–",
+        card.active_file or "–",
+        ", ".join(card.files or ()) or "–",
+        "–" if card.free_mb is None else f"{card.free_mb} MB",
     )

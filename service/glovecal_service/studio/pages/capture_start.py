@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.studio.heading import heading
+from glovecal_service.rest.glove.answer import GloveView, LayoutView
+from glovecal_service.rest.model.answer import Model
+from glovecal_service.rest.sampling.answer import SamplingView
+from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 
 PROTOCOLS = {
@@ -43,8 +46,8 @@ class _Form:
     def __init__(
         self,
         studio: Studio,
-        gloves: Sequence[Mapping[str, Any]],
-        started: Callable[[dict[str, Any]], Awaitable[None]],
+        gloves: Sequence[GloveView],
+        started: Callable[[SamplingView], Awaitable[None]],
     ) -> None:
         self._studio = studio
         self._worn = GloveAndWearer(studio, gloves)
@@ -57,19 +60,15 @@ class _Form:
         """The button that starts it, and the keys that work from then on. ``start`` raises Refusal."""
 
         async def clicked() -> None:
-            try:
+            with refusals(warn_long):
                 await start()
-            except Refusal as refusal:
-                ui.notify(str(refusal), type="warning", timeout=10_000)
 
-        ui.button(text, on_click=clicked).props("unelevated no-caps color=indigo-8 size=lg").classes(
-            "studio-main-act"
-        )
+        main_act(text, clicked, large=True)
 
     async def _begin(self, body: dict[str, Any]) -> None:
         """Raises Refusal."""
         worn = {"glove": self._worn.glove, "subject": self._worn.subject}
-        await self._started(await self._studio.service.post("/sampling", body | worn))
+        await self._started(await self._studio.service.ask(SamplingView, "/sampling", body | worn))
 
 
 class SamplingForm(_Form):
@@ -106,7 +105,9 @@ class SamplingForm(_Form):
 
     async def _rotations(self) -> list[str]:
         layout = self._worn.layout
-        return (await self._studio.service.get(f"/gloves/{quote(layout)}"))["rotations"] if layout else []
+        if not layout:
+            return []
+        return (await self._studio.service.read(LayoutView, f"/gloves/{quote(layout)}")).rotations
 
 
 class WearingForm(_Form):
@@ -137,10 +138,9 @@ class WearingForm(_Form):
 
     async def _require_model(self) -> None:
         worn = self._worn
-        models = await self._studio.service.get(
-            "/models", subject=worn.subject or None, layout=worn.layout, hand=worn.hand
-        )
-        if not any(each["active"] for each in models):
+        query = {"subject": worn.subject or None, "layout": worn.layout, "hand": worn.hand}
+        models = await self._studio.service.read(list[Model], "/models", **query)
+        if not any(each.active for each in models):
             raise Refusal(409, f"No model is active for {worn.subject or 'nobody'}: sample and train first.")
 
 

@@ -6,26 +6,39 @@ import asyncio
 import json
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urlencode
 
 from nicegui import ui
 
+from glovecal_models.calibration.answer import Explanation
+from glovecal_models.comparison.answer import Comparison
+from glovecal_models.comparison.series.answer import Series
+from glovecal_models.comparison.where.answer import Stretch, WhereItFails
 from glovecal_service.studio.amounts import degrees
-from glovecal_service.studio.charts.time_chart import TimeChart, worst_moment
+from glovecal_service.studio.charts.chart import TimeChart, worst_moment
+from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.comparison.angle_terms import angle_terms
-from glovecal_service.studio.comparison.choice_bar import ChoiceBar
-from glovecal_service.studio.comparison.choices import Choice, first_choice, short_names, usual_takes
+from glovecal_service.studio.comparison.choices import (
+    Choice,
+    ChoiceBar,
+    first_choice,
+    measured_takes,
+    short_names,
+    usual_takes,
+)
 from glovecal_service.studio.comparison.error_against_column import ErrorAgainstColumn
-from glovecal_service.studio.comparison.error_table import worst_rotation
 from glovecal_service.studio.comparison.replayed_hand import ReplayedHand
-from glovecal_service.studio.comparison.rotation_errors import RotationErrors
+from glovecal_service.studio.comparison.rotation_errors import RotationErrors, worst_rotation
 from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.hidden_walk import HiddenWalk
+from glovecal_service.studio.next_steps import next_steps
+from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
-NOTHING = "Nothing to compare yet: train a model, and record takes with measured angles."
+NOTHING = "There is no model with measured takes to compare."
+Found = TypeVar("Found")
 POINTS = 4000
 """Of one model; takes of a minute in all are drawn frame by frame."""
 
@@ -35,9 +48,9 @@ def add(studio: Studio) -> None:
 
     @page("/compare")
     async def compare(models: str = "", takes: str = "", rotation: str = "", column: str = "") -> None:
-        with shell(studio, "compare", "Compare"):
+        async with shell(studio, "compare", "Compare", about_models=True) as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
-            await ComparePage(studio, rotation, column).build(models, takes)
+            await ComparePage(studio, rotation, column).build(around.chosen, models, takes)
 
 
 class ComparePage:
@@ -48,19 +61,24 @@ class ComparePage:
         self._studio = studio
         self._rotation = rotation
         self._column = column
-        self._comparisons: list[Mapping[str, Any]] = []
-        self._series: list[Mapping[str, Any]] = []
+        self._comparisons: list[Comparison] = []
+        self._series: list[Series] = []
         self._client = ui.context.client
         self._moment = ("", 0.0)
         """Where cursor A is: a take's id, and seconds by its clock."""
 
-    async def build(self, wanted: str, on: str) -> None:
-        models, takes = await self._service.get("/models"), await self._service.get("/takes")
+    async def build(self, about: Chosen, wanted: str, on: str) -> None:
+        models = list(reversed(about.models))
+        takes = await about.takes(self._service)
+        if not wanted and about.model is not None and measured_takes(about.model, takes):
+            wanted = about.model.short
         choice = first_choice(models, takes, wanted, on)
         if choice is None:
             ui.label(NOTHING).classes("studio-notice compare-notice").props('role="status"')
+            await next_steps(self._service)
             return
         self._bar = ChoiceBar(models, takes, choice, self._show)
+        self._walk = HiddenWalk(self._service)
         await self._sections()
         ui.timer(0.0, self._begin, once=True)
 
@@ -85,7 +103,7 @@ class ComparePage:
                         self._stretches = ui.element("ol").classes("stretches")
                     with ui.element("div"):
                         self._hand = ReplayedHand(self._service)
-                        await self._hand.build(self._bar.choice.models[0]["subject"])
+                        await self._hand.build(self._bar.choice.models[0].subject)
             with ui.element("div").classes("compare-pair"):
                 with ui.element("section").classes("finding"):
                     heading(2, "The angle at cursor A, term by term")
@@ -112,7 +130,7 @@ class ComparePage:
         """Errors, then everything of the rotation; False, with a sentence, for what the service refuses."""
         if not choice.takes:
             self._bar.tell(
-                f"No take of {choice.models[0]['subject']} with layout {choice.models[0]['layout']} has "
+                f"No take of {choice.models[0].subject} with layout {choice.models[0].layout} has "
                 "measured angles."
             )
             self._busy.set_text("")
@@ -121,17 +139,20 @@ class ComparePage:
         body = {"takes": list(choice.takes)}
         rotation = self._rotation
         try:
-            comparisons = await self._of_models(choice, "compare", body)
-            if rotation not in comparisons[0]["rotations"]:
+            comparisons = await self._of_models(Comparison, choice, "compare", body)
+            if rotation not in comparisons[0].rotations:
                 rotation = worst_rotation(comparisons[0])
-            series = await self._of_models(choice, "series", body | {"rotation": rotation, "points": POINTS})
+            series = await self._of_models(
+                Series, choice, "series", body | {"rotation": rotation, "points": POINTS}
+            )
         except Refusal as refusal:
             self._bar.tell(str(refusal))
             self._busy.set_text("")
             return False
         self._bar.choose(choice)
         self._comparisons, self._rotation = comparisons, rotation
-        await self._hand.of(choice.models[0]["subject"])
+        await self._hand.of(choice.models[0].subject)
+        await self._walk.show(self._first_id)
         self._show_series(series)
         self._show_errors()
         self._busy.set_text("")
@@ -141,10 +162,10 @@ class ComparePage:
         return True
 
     async def _of_models(
-        self, choice: Choice, route: str, body: Mapping[str, Any]
-    ) -> list[Mapping[str, Any]]:
+        self, answer: type[Found], choice: Choice, route: str, body: Mapping[str, Any]
+    ) -> list[Found]:
         """One answer a model, in their order."""
-        asked = (self._service.post(f"/models/{each['id']}/{route}", body) for each in choice.models)
+        asked = (self._service.ask(answer, f"/models/{each.id}/{route}", body) for each in choice.models)
         return list(await asyncio.gather(*asked))
 
     @property
@@ -153,7 +174,7 @@ class ComparePage:
 
     @property
     def _first_id(self) -> str:
-        return self._bar.choice.models[0]["id"]
+        return self._bar.choice.models[0].id
 
     @property
     def _body(self) -> dict[str, Any]:
@@ -168,13 +189,13 @@ class ComparePage:
     def _linked_moment(self) -> float:
         """Of cursor A, on the linked axis."""
         id, at_s = self._moment
-        take = next(each for each in self._series[0]["takes"] if each["take"] == id)
-        return at_s - take["start_s"] + take["linked_s"]
+        take = next(each for each in self._series[0].takes if each.take == id)
+        return at_s - take.start_s + take.linked_s
 
     def _link(self) -> None:
         """The page's address, for others to open."""
         chosen = {
-            "models": ",".join(each["id"][:12] for each in self._bar.choice.models),
+            "models": ",".join(each.short for each in self._bar.choice.models),
             "takes": ",".join(self._bar.choice.takes),
             "rotation": self._rotation,
             "column": self._against.column,
@@ -187,7 +208,7 @@ class ComparePage:
         found = list(zip(self._names, self._comparisons, strict=True))
         self._errors.show(self._first_id, found, self._rotation)
 
-    def _show_series(self, series: list[Mapping[str, Any]]) -> None:
+    def _show_series(self, series: list[Series]) -> None:
         self._series = series
         if self._moment[0] not in self._bar.choice.takes:
             self._moment = worst_moment(series[0])
@@ -206,7 +227,7 @@ class ComparePage:
         """Its series and its row; False, with a sentence, for what the service refuses."""
         try:
             series = await self._of_models(
-                self._bar.choice, "series", self._body | {"rotation": rotation, "points": POINTS}
+                Series, self._bar.choice, "series", self._body | {"rotation": rotation, "points": POINTS}
             )
         except Refusal as refusal:
             self._bar.tell(str(refusal))
@@ -218,11 +239,11 @@ class ComparePage:
 
     async def _zoom(self, from_s: float, to_s: float) -> None:
         """Finer points of what is shown, where some were left out."""
-        if all(take["frames"] == len(take["time_s"]) for each in self._series for take in each["takes"]):
+        if all(take.frames == len(take.time_s) for each in self._series for take in each.takes):
             return
         key = (self._bar.choice, self._rotation)
         window = {"from_s": from_s, "to_s": to_s, "points": POINTS}
-        finer = await self._of_models(self._bar.choice, "series", self._body | window)
+        finer = await self._of_models(Series, self._bar.choice, "series", self._body | window)
         if key == (self._bar.choice, self._rotation):
             self._chart.show(
                 list(zip(self._names, finer, strict=True)), key=self._key, at_s=self._linked_moment
@@ -232,47 +253,46 @@ class ComparePage:
 
     async def _show_stretches(self) -> None:
         choice = self._bar.choice
-        path = f"/models/{choice.models[0]['id']}/where"
-        try:
-            found = await self._service.post(path, {"takes": list(choice.takes)})
-        except Refusal as refusal:
-            self._stretch_title.set_text(str(refusal))
-            return
-        if choice != self._bar.choice:
-            return
-        self._stretch_title.set_text(f"Worst seconds of {self._names[0]}; a click replays one on the hand.")
-        self._onward.clear()
-        with self._onward:
-            ui.label("Which physical effect is missing?")
-            ui.link("Diagnose", f"/diagnose?model={choice.models[0]['id']}").classes("studio-link")
-        self._stretches.clear()
-        with self._stretches:
-            for stretch in found["stretches"]:
-                self._stretch(stretch)
+        path = f"/models/{choice.models[0].id}/where"
+        with refusals(self._stretch_title.set_text):
+            found = await self._service.ask(WhereItFails, path, {"takes": list(choice.takes)})
+            if choice != self._bar.choice:
+                return
+            self._stretch_title.set_text(
+                f"Worst seconds of {self._names[0]}; a click replays one on the hand."
+            )
+            self._onward.clear()
+            with self._onward:
+                ui.label("Which physical effect is missing?")
+                ui.link("Diagnose", f"/diagnose?model={choice.models[0].id}").classes("studio-link")
+            self._stretches.clear()
+            with self._stretches:
+                for stretch in found.stretches:
+                    self._stretch(stretch)
 
-    def _stretch(self, stretch: Mapping[str, Any]) -> None:
-        take = self._series[0]["takes"][stretch["number"]]
-        begin, end = (stretch[name] - take["start_s"] for name in ("start_s", "end_s"))
-        pose = f", {stretch['pose']}" if stretch["pose"] else ""
+    def _stretch(self, stretch: Stretch) -> None:
+        take = self._series[0].takes[stretch.number]
+        begin, end = (at_s - take.start_s for at_s in (stretch.start_s, stretch.end_s))
+        pose = f", {stretch.pose}" if stretch.pose else ""
         with (
             ui.element("li"),
             ui.element("button").classes("stretch").props('type="button"') as button,
         ):
-            ui.label(f"{take['name']}, {begin:.1f} to {end:.1f} s{pose}").classes("stretch-where")
+            ui.label(f"{take.name}, {begin:.1f} to {end:.1f} s{pose}").classes("stretch-where")
             ui.label(
-                f"{degrees(stretch['rmse_deg'])} over all rotations, {stretch['rotation']} "
-                f"{degrees(stretch['rotation_rmse_deg'])}"
+                f"{degrees(stretch.rmse_deg)} over all rotations, {stretch.rotation} "
+                f"{degrees(stretch.rotation_rmse_deg)}"
             )
         button.on("click", partial(self._replay_stretch, stretch))
 
-    async def _replay_stretch(self, stretch: Mapping[str, Any]) -> None:
-        take = self._series[0]["takes"][stretch["number"]]
-        begin, end = stretch["start_s"], stretch["end_s"]
-        self._moment = (take["take"], begin)
+    async def _replay_stretch(self, stretch: Stretch) -> None:
+        take = self._series[0].takes[stretch.number]
+        begin, end = stretch.start_s, stretch.end_s
+        self._moment = (take.take, begin)
 
         async def point_at_it() -> None:
-            turned = stretch["rotation"] != self._rotation and await self._turn_to(stretch["rotation"])
-            to_linked = take["linked_s"] - take["start_s"]
+            turned = stretch.rotation != self._rotation and await self._turn_to(stretch.rotation)
+            to_linked = take.linked_s - take.start_s
             self._chart.show_stretch(begin + to_linked, end + to_linked)
             await self._show_terms()
             if turned:
@@ -290,24 +310,20 @@ class ComparePage:
     async def _explain(self) -> None:
         """The hand and the angle's terms where cursor A is."""
         id, at_s = self._moment
-        take = next(each for each in self._series[0]["takes"] if each["take"] == id)
+        take = next(each for each in self._series[0].takes if each.take == id)
         await asyncio.gather(self._hand.play(self._first_id, take, at_s, at_s), self._show_terms())
 
     async def _show_terms(self) -> None:
         choice, names = self._bar.choice, self._names
         take, at_s = self._moment
         body = {"take": take, "at_s": at_s, "rotations": [self._rotation]}
-        try:
-            answers = await self._of_models(choice, "explain", body)
-        except Refusal as refusal:
-            self._bar.tell(str(refusal))
-            return
-        if choice != self._bar.choice:
-            return
-        self._terms.clear()
-        with self._terms:
-            start = next(each["start_s"] for each in self._series[0]["takes"] if each["take"] == take)
-            first = answers[0]
-            ui.label(f"{self._rotation} in {first['name']} at {first['time_s'] - start:.3f} s")
-            for name, answer in zip(names, answers, strict=True):
-                angle_terms(name, answer)
+        with refusals(self._bar.tell):
+            found = await self._of_models(Explanation, choice, "explain", body)
+            if choice != self._bar.choice:
+                return
+            self._terms.clear()
+            with self._terms:
+                start = next(each.start_s for each in self._series[0].takes if each.take == take)
+                ui.label(f"{self._rotation} in {found[0].name} at {found[0].time_s - start:.3f} s")
+                for name, answer in zip(names, found, strict=True):
+                    angle_terms(name, answer)

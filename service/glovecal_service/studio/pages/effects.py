@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
+from glovecal_service.rest.effect.answer import CatalogueEffect, SchematicView
 from glovecal_service.studio.findings.schematic_view import schematic_view
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.own_expression import OwnExpression
@@ -29,32 +29,33 @@ def add(studio: Studio) -> None:
     """``/studio/effects``."""
 
     @page("/effects")
-    async def effects(model: str = "") -> None:
-        with shell(studio, "effects", "Effects"):
+    async def effects() -> None:
+        async with shell(studio, "effects", "Effects", about_models=True) as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
-            found = await studio.service.get("/effects")
+            found = await studio.service.read(list[CatalogueEffect], "/effects")
             pictures = []
-            ui.label("Dashed: without the effect. Solid: with it. Sizes are for show, shapes are its own.")
+            ui.label("Dashed: without the effect. Solid: with it. Shapes are real, sizes exaggerated.")
             ui.link("Write an effect of your own", "#own").classes("studio-link own-link")
             with ui.element("div").classes("cards"):
                 for effect in found:
                     with ui.element("section").classes("card").props() as section:
-                        section.props["id"] = quote(effect["name"])
-                        heading(2, effect["name"])
-                        ui.label(effect["explanation"])
+                        section.props["id"] = quote(effect.name)
+                        heading(2, effect.name)
+                        ui.label(effect.explanation)
                         ui.label(_second_sentence(effect)).classes("effect-kind")
-                        pictures.append((effect["name"], ui.element("div").classes("schematic-place")))
+                        pictures.append((effect.name, ui.element("div").classes("schematic-place")))
             with ui.element("section").props('id="own"').classes("finding own-effect"):
                 heading(2, "An effect of your own")
-                await OwnExpression(studio, model).build()
+                if model := await around.model(studio.service):
+                    await OwnExpression(studio, model.id).build()
             ui.timer(0.0, partial(_draw, studio.service, pictures), once=True)
 
 
-def _second_sentence(effect: Mapping[str, Any]) -> str:
-    told = WHAT_IT_DOES[effect["kind"]]
-    needs = ", ".join(f"c.{name}" for name in effect["context"])
+def _second_sentence(effect: CatalogueEffect) -> str:
+    told = WHAT_IT_DOES[effect.kind]
+    needs = ", ".join(f"c.{name}" for name in effect.context)
     more = [f"It needs the context column {needs}."] if needs else []
-    if effect["has_memory"] and effect["kind"] == "correction":
+    if effect.has_memory and effect.kind == "correction":
         more.append("It remembers earlier frames.")
     return " ".join([told, *more])
 
@@ -63,7 +64,7 @@ async def _draw(service: Service, places: Sequence[tuple[str, ui.element]]) -> N
     """One after another: the page is there before its pictures."""
     for name, place in places:
         try:
-            answer = await service.get(f"/effects/{quote(name)}/schematic")
+            answer = await service.read(SchematicView, f"/effects/{quote(name)}/schematic")
         except Refusal:
             continue
         with place:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -11,6 +11,8 @@ from nicegui.events import ValueChangeEventArguments
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
+from glovecal_service.rest.glove.answer import GloveView
+from glovecal_service.rest.subject.answer import Subject
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -20,20 +22,20 @@ WORD_EVERY_S = 0.7
 class GloveAndWearer:
     """The choice of a glove and its wearer, with the glove's state in a word."""
 
-    def __init__(self, studio: Studio, gloves: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(self, studio: Studio, gloves: Sequence[GloveView]) -> None:
         self._studio = studio
-        self._gloves = {each["name"]: each for each in gloves}
+        self._gloves = {each.name: each for each in gloves}
         self._word: ui.label
 
     async def build(self, subject: str | None = None) -> None:
-        names = [each["name"] for each in await self._studio.service.get("/subjects")]
+        names = await self._subjects()
         states = await _states(self._studio)
-        newest = sorted(self._gloves, key=lambda name: (name in states, self._gloves[name]["last_seen_at"]))
+        newest = sorted(self._gloves, key=lambda name: (name in states, self._gloves[name].last_seen_at))
         with ui.element("div").classes("capture-fields"):
             self._glove = ui.select(
                 list(self._gloves), value=newest[-1], label="Glove", on_change=self._changed
             ).classes("choice")
-            wearer = subject or self._gloves[newest[-1]]["subject"]
+            wearer = subject or self._gloves[newest[-1]].subject
             self._subject = (
                 ui.select(
                     names,
@@ -57,28 +59,31 @@ class GloveAndWearer:
 
     @property
     def layout(self) -> str | None:
-        return self._gloves[self.glove]["layout"]
+        return self._gloves[self.glove].layout
 
     @property
     def hand(self) -> str | None:
         """Which one the glove is for; None where its capture does not know."""
-        return hand_of(self._gloves[self.glove])
+        return self._gloves[self.glove].known_hand
 
     @property
     def subject(self) -> str:
         return str(self._subject.value or "").strip().lower()
+
+    async def _subjects(self) -> list[str]:
+        return [each.name for each in await self._studio.service.read(list[Subject], "/subjects")]
 
     async def put_on(self, wearing: str | None = None) -> None:
         """Tell the service who wears the glove, and in which wearing; a new subject is added. Raises
         Refusal."""
         if not self.subject:
             raise Refusal(422, "Choose a subject, or type a new name.")
-        known = [each["name"] for each in await self._studio.service.get("/subjects")]
+        known = await self._subjects()
         glove = self._gloves[self.glove]
         if self.subject not in known:
             await self._studio.service.post("/subjects", {"name": self.subject, "hand": self.hand})
-        if wearing is not None or glove["subject"] != self.subject:
-            body = {"subject": self.subject, "wearing": wearing or glove["wearing"]}
+        if wearing is not None or glove.subject != self.subject:
+            body = {"subject": self.subject, "wearing": wearing or glove.wearing}
             await self._studio.service.put(f"/gloves/{quote(self.glove)}/wearer", body)
 
     async def _look(self) -> None:
@@ -91,7 +96,7 @@ class GloveAndWearer:
         self._sentence.set_text("Its capture is not running." if state is None else state.sentence)
 
     async def _changed(self, event: ValueChangeEventArguments) -> None:
-        wearer = self._gloves[str(event.value)]["subject"]
+        wearer = self._gloves[str(event.value)].subject
         if wearer:
             self._subject.set_value(wearer)
         await self._look()
@@ -102,8 +107,3 @@ async def _states(studio: Studio) -> dict[str, Any]:
         return await run_in_threadpool(studio.feeds.states)
     except ClientError:
         return {}
-
-
-def hand_of(glove: Mapping[str, Any]) -> str | None:
-    """Which one a glove is for; None where its capture does not know."""
-    return glove["hand"] if glove.get("hand") in ("left", "right") else None

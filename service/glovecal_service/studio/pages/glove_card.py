@@ -12,18 +12,19 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
+from glovecal_service.rest.glove.answer import Gloves, GloveView, LayoutView
+from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.glove_state import GloveState
-from glovecal_service.studio.hand.hand_view import HandView, Side
+from glovecal_service.studio.hand.hand_view import SIDES, HandView
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.explained_joint import ExplainedJoint
-from glovecal_service.studio.pages.glove_and_wearer import hand_of
 from glovecal_service.studio.pages.refine_by_hand import RefineByHand
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
 from glovecal_service.studio.studio import Studio
+from glovecal_service.studio.table import fact_list
 
-SIDES: tuple[tuple[Side, str], ...] = (("back", "Back"), ("palm", "Palm"), ("side", "Side"))
 LOOK_AGAIN_S = 3.0
 """Models and wearers change elsewhere too."""
 LEAST_SHARE = 0.1
@@ -105,11 +106,12 @@ class GloveCard:
         for name, text in facts.items():
             self._facts[name].set_text(text)
 
-    async def _fill(self, glove: Mapping[str, Any]) -> None:
+    async def _fill(self, glove: GloveView | None) -> None:
         feed = f"/studio/feed/{quote(self._glove)}"
         skeleton = await self._skeleton(glove)
         reads, least = await self._raw_reading(glove)
         self._worn, self._models, self._active = _worn(glove), {}, None
+        self._is_offered = False
         if self._joint is not None:
             self._joint.end()
         self.section.clear()
@@ -120,7 +122,7 @@ class GloveCard:
                 subject, _, hand, _ = self._worn
                 ui.label(", ".join(filter(None, (subject, f"{hand} hand" if hand else ""))))
             self._sentence = ui.label("").classes("glove-sentence")
-            self._facts = _facts()
+            self._facts = fact_list(FACTS)
             self._choice = ui.element("div").classes("glove-models")
             with ui.element("div").classes("glove-parts"):
                 with ui.element("div").classes("glove-seen"):
@@ -140,11 +142,13 @@ class GloveCard:
     def _view_acts(self, view: HandView, reads: Mapping[str, str], least: float) -> None:
         with ui.row().classes("glove-acts"):
             with ui.element("div").classes("glove-sides").props('role="group" aria-label="Seen from"'):
-                for side, name in SIDES:
-                    _act(name, partial(view.look, side))
+                for side in SIDES:
+                    _act(side.capitalize(), partial(view.look, side))
             with ui.element("div").classes("glove-sides").props('role="group" aria-label="Hands shown"'):
                 _switch("Calibrated", True, view.calibrated)
-                _switch("Raw", False, lambda shown: self._show_raw(view, reads, least, shown))
+                self._turn_raw = _switch(
+                    "Raw", False, lambda shown: self._show_raw(view, reads, least, shown)
+                )
         self._raw_is = ui.label(RAW_IS).classes("glove-raw-is")
         self._raw_is.set_visibility(False)
         view.raw(reads, least=least, shown=False)
@@ -157,46 +161,47 @@ class GloveCard:
         view.raw(reads, least=least, shown=shown)
         self._raw_is.set_visibility(shown)
 
-    async def _seen(self) -> Mapping[str, Any]:
+    async def _seen(self) -> GloveView | None:
+        """None before anything was said of it."""
         self._looked_at = time.monotonic()
-        seen = (await self._studio.service.get("/gloves"))["seen"]
-        return next((each for each in seen if each["name"] == self._glove), {})
+        seen = (await self._studio.service.read(Gloves, "/gloves")).seen
+        return next((each for each in seen if each.name == self._glove), None)
 
-    async def _skeleton(self, glove: Mapping[str, Any]) -> dict[str, Any]:
+    async def _skeleton(self, glove: GloveView | None) -> dict[str, Any]:
         """Of the wearer, else of a hand of usual size."""
-        hand = hand_of(glove)
-        if glove.get("subject"):
+        hand = glove and glove.known_hand
+        if glove and glove.subject:
             with suppress(Refusal):
-                return await self._studio.service.get(
-                    f"/subjects/{quote(glove['subject'])}/skeleton", hand=hand
-                )
+                return await self._studio.service.get(f"/subjects/{quote(glove.subject)}/skeleton", hand=hand)
         return await self._studio.service.get("/skeleton", hand=hand)
 
-    async def _raw_reading(self, glove: Mapping[str, Any]) -> tuple[dict[str, str], float]:
+    async def _raw_reading(self, glove: GloveView | None) -> tuple[dict[str, str], float]:
         """The sensor that each rotation of the raw hand is read from, and how far it has to have moved."""
-        if not glove.get("layout"):
+        if not glove or not glove.layout:
             return {}, LEAST_COUNTS
         try:
-            layout = (await self._studio.service.get(f"/gloves/{quote(glove['layout'])}"))["document"]
+            layout = await self._studio.service.read(LayoutView, f"/gloves/{quote(glove.layout)}")
         except Refusal:
             return {}, LEAST_COUNTS
         reads = {
             rotation: rotation if rotation in sensors else sensors[0]
-            for rotation, sensors in layout["rotations"].items()
+            for rotation, sensors in layout.read_from.items()
             if sensors
         }
-        counts = layout.get("counts")
+        counts = layout.document.get("counts")
         return reads, LEAST_SHARE * (counts[1] - counts[0]) if counts else LEAST_COUNTS
 
-    async def _offer_models(self, glove: Mapping[str, Any]) -> None:
+    async def _offer_models(self, glove: GloveView | None) -> None:
         """The models of the wearer; what is active elsewhere is chosen here."""
-        if not glove.get("subject") or not glove.get("layout"):
+        if glove is None or not glove.layout:
             return
-        found = await self._studio.service.get(
-            "/models", subject=glove["subject"], layout=glove["layout"], hand=hand_of(glove)
-        )
-        names = {each["id"]: version_name(each) for each in found}
-        active = next((each["id"] for each in found if each["active"]), None)
+        query = {"subject": glove.subject, "layout": glove.layout, "hand": glove.known_hand}
+        found = await self._studio.service.read(list[Model], "/models", **query) if glove.subject else []
+        if not found:
+            self._offer_calibration(glove.subject)
+            return
+        names = {each.id: version_name(each) for each in found}
+        active = next((each.id for each in found if each.active), None)
         if names == self._models and active == self._active:
             return
         is_first = not self._models
@@ -205,11 +210,21 @@ class GloveCard:
             self._choice.clear()
             with self._choice:
                 self._select = ui.select(
-                    names, value=active, label=f"Model of {glove['subject']}", on_change=self._activate
+                    names, value=active, label=f"Model of {glove.subject}", on_change=self._activate
                 ).classes("choice")
         else:
             self._select.set_options(names, value=active)
         await self._refine.follow(active)
+
+    def _offer_calibration(self, subject: str | None) -> None:
+        """The raw hand moves at once; what is shown calibrated comes after this."""
+        if self._is_offered:
+            return
+        self._is_offered = True
+        self._turn_raw()
+        with self._choice:
+            who = f"?who={quote(subject)}" if subject else ""
+            ui.link("Calibrate this hand", f"/capture{who}").classes("studio-link next-step-act")
 
     async def _activate(self, event: Any) -> None:
         if event.value in (None, self._active):  # this page follows a change made elsewhere
@@ -223,22 +238,11 @@ class GloveCard:
         self._active = event.value
 
 
-def _worn(glove: Mapping[str, Any]) -> tuple[Any, ...]:
+def _worn(glove: GloveView | None) -> tuple[Any, ...]:
     """What a card is built for: subject, layout, hand, sensors."""
-    sensors = (glove.get("meta") or {}).get("sensors")
-    return glove.get("subject"), glove.get("layout"), hand_of(glove), str(sensors)
-
-
-def _facts() -> dict[str, ui.label]:
-    """Name and number of each; a title tells what it is."""
-    labels = {}
-    with ui.element("ul").classes("glove-facts"):
-        for name, what in FACTS.items():
-            with ui.element("li") as item:
-                item.props["title"] = what
-                ui.label(name).classes("glove-fact")
-                labels[name] = ui.label("–").classes("glove-number")
-    return labels
+    if glove is None:
+        return None, None, None, ""
+    return glove.subject, glove.layout, glove.known_hand, str(glove.meta.get("sensors"))
 
 
 def _act(name: str, act: Callable[[], Any]) -> TextElement:
@@ -248,7 +252,9 @@ def _act(name: str, act: Callable[[], Any]) -> TextElement:
     return button
 
 
-def _switch(name: str, shown: bool, show: Callable[[bool], Any]) -> None:
+def _switch(name: str, shown: bool, show: Callable[[bool], Any]) -> Callable[[], None]:
+    """A button that stays pressed; what presses it."""
+
     def turn() -> None:
         now = button.props["aria-pressed"] != "true"
         button.props["aria-pressed"] = "true" if now else "false"
@@ -257,3 +263,4 @@ def _switch(name: str, shown: bool, show: Callable[[bool], Any]) -> None:
 
     button = _act(name, turn)
     button.props["aria-pressed"] = "true" if shown else "false"
+    return turn

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from datetime import datetime
-from typing import Any
-
 from nicegui import ui
 
+from glovecal_service.rest.glove.answer import Gloves, GloveView, LayoutView
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.service import Service
 from glovecal_service.studio.table import table, text_row
@@ -18,43 +15,42 @@ LAYOUT_HEADS = ("Layout", "Sensors", "Rotations", "Of them read from several sen
 
 async def gloves_table(service: Service) -> None:
     """Two sections; the first only once a glove was seen."""
-    found = await service.get("/gloves")
-    if found["seen"]:
-        with ui.element("section").classes("tree").props('aria-label="Gloves seen"'):
+    found = await service.read(Gloves, "/gloves")
+    if found.seen:
+        with ui.element("section").classes("tree"):
             heading(2, "Gloves seen")
             with table("Gloves seen", GLOVE_HEADS):
-                for glove in found["seen"]:
+                for glove in found.seen:
                     _glove(glove)
-    with ui.element("section").classes("tree").props('aria-label="Layouts"'):
+    with ui.element("section").classes("tree"):
         heading(2, "Layouts")
         ui.label("A layout says which sensors a glove has, and which of them read each rotation.")
         with table("Layouts", LAYOUT_HEADS):
-            for layout in found["layouts"]:
+            for layout in found.layouts:
                 _layout(layout)
 
 
-def _glove(glove: Mapping[str, Any]) -> None:
-    name = f"{glove['name']} (simulated)" if glove["simulated"] else glove["name"]
-    latency = glove["latency"]
+def _glove(glove: GloveView) -> None:
+    name = f"{glove.name} (simulated)" if glove.simulated else glove.name
+    latency = glove.latency
     text_row(
         name,
-        glove["layout"] or "–",
-        glove["hand"] or "–",
-        glove["subject"] or "nobody",
-        glove["wearing"] or "–",
+        glove.layout or "–",
+        glove.hand or "–",
+        glove.subject or "nobody",
+        glove.wearing or "–",
         "not measured"
         if latency is None
-        else f"{1000 * latency['latency_s']:.0f} ± {1000 * latency['sd_s']:.0f} ms",
-        f"{datetime.fromisoformat(glove['last_seen_at']).astimezone():%Y-%m-%d %H:%M}",
+        else f"{1000 * latency.latency_s:.0f} ± {1000 * latency.sd_s:.0f} ms",
+        f"{glove.last_seen_at.astimezone():%Y-%m-%d %H:%M}",
     )
 
 
-def _layout(layout: Mapping[str, Any]) -> None:
-    read_from = layout["document"]["rotations"].values()
+def _layout(layout: LayoutView) -> None:
     text_row(
-        layout["name"],
-        str(len(layout["sensors"])),
-        str(len(layout["rotations"])),
-        str(sum(len(sensors) > 1 for sensors in read_from)),
-        "built in" if layout["built_in"] else "stored here",
+        layout.name,
+        str(len(layout.sensors)),
+        str(len(layout.rotations)),
+        str(sum(len(sensors) > 1 for sensors in layout.read_from.values())),
+        "built in" if layout.built_in else "stored here",
     )

@@ -6,11 +6,13 @@ from nicegui import ui
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
+from glovecal_service.studio.next_steps import connect_or_try, next_steps
 from glovecal_service.studio.pages.glove_card import GloveCard
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
+NO_GLOVE = "No glove is connected. Run: glovecal capture --device DEVICE --glove NAME"
 
 
 def add(studio: Studio) -> None:
@@ -19,7 +21,7 @@ def add(studio: Studio) -> None:
     @page("/")
     @page("/live")
     async def live() -> None:
-        with shell(studio, "live", "Live"):
+        async with shell(studio, "live", "Live"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
             await LivePage(studio).build()
 
@@ -34,6 +36,10 @@ class LivePage:
     async def build(self) -> None:
         self._notice = ui.label("").classes("studio-notice").props('role="status"')
         self._gloves = ui.element("div").classes("gloves")
+        self._next = ui.element("div")
+        with self._next:
+            connect_or_try()
+            await next_steps(self._studio.service)
         await self._look()
         ui.timer(EVERY_S, self._look)
 
@@ -43,9 +49,8 @@ class LivePage:
         except ClientError as error:
             self._notice.set_text(f"The real-time process does not answer: {error}")
             return
-        self._notice.set_text(
-            "" if states else "No glove is connected. Run: glovecal capture --device DEVICE --glove NAME"
-        )
+        self._notice.set_text("" if states else NO_GLOVE)
+        self._next.set_visibility(not states)
         new = [glove for glove in states if glove not in self._cards]
         for glove in new:
             with self._gloves:

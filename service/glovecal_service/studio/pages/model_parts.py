@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
+from glovecal_models.calibration.answer import ModelEffect
+from glovecal_service.rest.model.answer import ModelInFull
 from glovecal_service.studio.amounts import degrees
-from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Refusal, Service
+from glovecal_service.studio.heading import act, heading
+from glovecal_service.studio.service import Refusal, Service, refusals
 from glovecal_service.studio.table import table, text_row
 
 ROTATION_HEADS = ("Rotation", "Kind", "Read from", "Regression", "Held-out error", "Noise")
@@ -22,7 +22,7 @@ class ModelParts:
 
     def __init__(self, service: Service, model: str) -> None:
         self._service, self._model = service, model
-        self._body = ui.expansion("Take apart", on_value_change=self._open).props("dense")
+        self._body = ui.expansion("Look inside", on_value_change=self._open).props("dense")
         self._body.classes("model-parts")
         self._is_shown = False
 
@@ -32,38 +32,34 @@ class ModelParts:
         self._is_shown = True
         with self._body:
             try:
-                found = await self._service.get(f"/models/{self._model}")
+                found = await self._service.read(ModelInFull, f"/models/{self._model}")
             except Refusal as refusal:
                 ui.label(str(refusal)).classes("studio-problem")
                 return
-            for number, effect in enumerate(found["effect_details"], 1):
-                heading(3, f"Effect {number}: {effect['effect']}")
-                ui.label(effect["explanation"])
+            for number, effect in enumerate(found.effect_details, 1):
+                heading(3, f"Effect {number}: {effect.effect}")
+                ui.label(effect.explanation)
                 _numbers(effect)
-                out = ui.button(f"Take {effect['effect']} out", on_click=partial(self._out, effect["effect"]))
-                out.props("outline no-caps").classes("studio-target")
-            heading(3, f"Base: {found['method']}")
+                act(f"Take {effect.effect} out", partial(self._out, effect.effect))
+            heading(3, f"Base: {found.method}")
             with table("Rotations of the model", ROTATION_HEADS):
-                for one in found["rotations"]:
+                for one in found.rotations:
                     text_row(
-                        one["rotation"], one["kind"], ", ".join(one["sensors"]) or "other rotations",
-                        one["method"], degrees(one["held_out_rmse_deg"]), degrees(one["noise_deg"]),
+                        one.rotation, one.kind, ", ".join(one.sensors) or "other rotations",
+                        one.method, degrees(one.held_out_rmse_deg), degrees(one.noise_deg),
                     )  # fmt: skip
 
     async def _out(self, effect: str) -> None:
         """The job is followed where the error falls."""
-        try:
+        with refusals():
             await self._service.delete(f"/models/{self._model}/effects/{quote(effect)}")
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")
-            return
-        ui.navigate.to(f"/fall?model={self._model}")
+            ui.navigate.to(f"/fall?model={self._model}")
 
 
-def _numbers(effect: Mapping[str, Any]) -> None:
-    names = list(dict.fromkeys(name for own in effect["parameters"].values() for name in own))
+def _numbers(effect: ModelEffect) -> None:
+    names = list(dict.fromkeys(name for own in effect.parameters.values() for name in own))
     if not names:
         return
-    with table(f"What {effect['effect']} learned", ("Rotation", *names)):
-        for rotation, own in effect["parameters"].items():
+    with table(f"What {effect.effect} learned", ("Rotation", *names)):
+        for rotation, own in effect.parameters.items():
             text_row(rotation, *("–" if own.get(name) is None else f"{own[name]:.4g}" for name in names))

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
+from glovecal_service.plain import read
+from glovecal_service.rest.job.answer import Job, JobFacts
+from glovecal_service.rest.model.answer import ImportedModel, Model
 from glovecal_service.studio.amounts import degrees, made_of
 from glovecal_service.studio.file_button import FileButton
 from glovecal_service.studio.hand.dimensions_form import DimensionsForm
-from glovecal_service.studio.heading import heading
+from glovecal_service.studio.heading import act, heading, quiet_act
+from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.next_steps import next_steps
+from glovecal_service.studio.paged_list import PagedList
 from glovecal_service.studio.pages.gloves_table import gloves_table
 from glovecal_service.studio.pages.model_parts import ModelParts
-from glovecal_service.studio.pages.takes_table import TakesTable
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 2.0
+AT_ONCE = 60
 
 
 def add(studio: Studio) -> None:
@@ -26,11 +33,10 @@ def add(studio: Studio) -> None:
 
     @page("/models")
     async def models() -> None:
-        with shell(studio, "models", "Models and subjects"):
+        async with shell(studio, "models", "Models and subjects"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             await ModelsPage(studio).build()
             with ui.element("div").classes("trees"):
-                await TakesTable(studio.service).build()
                 await DimensionsForm(studio.service).build()
                 await gloves_table(studio.service)
 
@@ -40,105 +46,132 @@ class ModelsPage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
-        self._seen: object = None
+        self._list = PagedList(
+            studio.service, Model, "/models", self._show, what="models", at_once=AT_ONCE,
+            key=lambda model: (model.id, model.active, model.damage),
+        )  # fmt: skip
 
     async def build(self) -> None:
         self._notice = ui.label("").classes("studio-notice").props('role="status"')
-        self._trees = ui.element("div").classes("trees")
+        self._news = ui.row().classes("choices").props('aria-live="polite"')
+        self._watch = JobWatch(self._studio, self._reported)
+        await self._list.build()
         FileButton(
             "Import a model", suffixes=".safetensors", largest=self._studio.largest_file,
             take=self._import, tell=self._notice.set_text,
         ).button.props("outline no-caps").classes("studio-target page-acts")  # fmt: skip
-        await self._look()
-        ui.timer(EVERY_S, self._look)
+        ui.timer(EVERY_S, self._list.look)
 
-    async def _look(self) -> None:
-        models = await self._studio.service.get("/models")
-        seen = [(each["id"], each["active"], each["damage"]) for each in models]
-        if seen == self._seen:
-            return
-        self._seen = seen
-        self._notice.set_text("" if models else "No model yet: record takes and train one.")
-        self._trees.clear()
-        with self._trees:
+    async def _show(self, models: list[Model]) -> None:
+        self._notice.set_text("" if models else "No model here.")
+        with ui.element("div").classes("trees"):
+            if not models:
+                await next_steps(self._studio.service)
             for worn in dict.fromkeys(_worn(each) for each in models):
-                self._tree(*worn, [each for each in models if _worn(each) == worn])
+                self._tree(*worn, [each for each in reversed(models) if _worn(each) == worn])
 
-    def _tree(self, subject: str, layout: str, hand: str | None, models: Sequence[Mapping[str, Any]]) -> None:
+    def _tree(self, subject: str, layout: str, hand: str | None, models: Sequence[Model]) -> None:
         of_hand = f", {hand} hand" if hand else ""
         with ui.element("section").classes("tree").props() as section:
-            section.props["aria-label"] = f"Models of {subject}{of_hand}"
+            section.props["aria-label"] = f"Models of {subject}, {layout}{of_hand}"
             with ui.row().classes("tree-head"):
                 heading(2, f"{subject}, {layout}{of_hand}")
-                ui.button(
-                    "Return to the model before", on_click=lambda: self._roll_back(subject, layout, hand)
-                ).props("outline no-caps").classes("studio-target")
-            known = {each["id"] for each in models}
-            for root in (each for each in models if each["parent"] not in known):
+                act("Return to the model before", lambda: self._roll_back(subject, layout, hand))
+            known = {each.id for each in models}
+            for root in (each for each in models if each.parent not in known):
                 self._branch(root, models)
 
-    def _branch(self, model: Mapping[str, Any], models: Sequence[Mapping[str, Any]]) -> None:
+    def _branch(self, model: Model, models: Sequence[Model]) -> None:
         """A version and what descends from it, indented."""
         with ui.element("div").classes("branch"):
             self._version(model)
-            for child in (each for each in models if each["parent"] == model["id"]):
+            for child in (each for each in models if each.parent == model.id):
                 self._branch(child, models)
 
-    def _version(self, model: Mapping[str, Any]) -> None:
+    def _version(self, model: Model) -> None:
         with ui.element("article").classes("version") as article:
-            article.props["data-model"] = model["id"]
+            article.props["data-model"] = model.id
             with ui.row().classes("version-row"):
-                ui.label(model["id"][:12]).classes("version-id")
+                ui.label(model.short).classes("version-id")
+                field = ui.input("Name", value=model.name).props("dense")
+                field.on("blur", partial(self._name, model, field), args=[])
                 ui.label(made_of(model))
-                ui.label(f"held-out error {degrees(model['held_out_rmse_deg'])}").classes("version-error")
-                if model["rmse_unseen_wearing_deg"] is not None:
-                    ui.label(f"in a wearing not seen {degrees(model['rmse_unseen_wearing_deg'])}")
-                if model["active"]:
+                ui.label(f"held-out error {degrees(model.held_out_rmse_deg)}").classes("version-error")
+                if model.rmse_unseen_wearing_deg is not None:
+                    ui.label(f"in a wearing not seen {degrees(model.rmse_unseen_wearing_deg)}")
+                if model.active:
                     ui.label("active").classes("state-word").props('data-word="ok"')
-            if model["damage"]:
-                ui.label(model["damage"]).classes("studio-problem")
+            if model.damage:
+                ui.label(model.damage).classes("studio-problem")
             with ui.row().classes("version-acts"):
-                if not model["active"]:
-                    ui.button("Activate", on_click=lambda: self._activate(model["id"])).props(
-                        "outline no-caps"
-                    ).classes("studio-target")
-                ui.link("Diagnose", f"/diagnose?model={model['id']}").classes("studio-link")
-                ui.link("Error fall", f"/fall?model={model['id']}").classes("studio-link")
-                ui.link("Export", f"../v1/models/{model['id']}/export").classes("studio-link").props(
-                    "download"
-                )
-            ModelParts(self._studio.service, model["id"])
+                if not model.active:
+                    act("Activate", lambda: self._activate(model.id))
+                    quiet_act("Remove", lambda: self._remove(model))
+                act("Report", partial(self._report, model))
+                ui.link("Diagnose", f"/diagnose?model={model.id}").classes("studio-link")
+                ui.link("Error fall", f"/fall?model={model.id}").classes("studio-link")
+                ui.link("Export", f"../v1/models/{model.id}/export").classes("studio-link").props("download")
+            ModelParts(self._studio.service, model.id)
 
     async def _activate(self, model: str) -> None:
         await self._do(f"/models/{model}/activate", {}, "Live poses come from this model now.")
 
+    async def _name(self, model: Model, field: ui.input) -> None:
+        with refusals():
+            body = {"name": (field.value or "").strip(), "note": model.note}
+            await self._studio.service.put(f"/models/{model.id}/name", body)
+
+    async def _report(self, model: Model) -> None:
+        with refusals():
+            job = await self._studio.service.ask(JobFacts, f"/models/{model.id}/calibration-report")
+            self._watch.follow(job.id)
+
+    async def _reported(self, job: Job) -> None:
+        if job.state != "done":
+            return
+        report = f"../v1/jobs/{job.id}/report"
+        self._news.clear()
+        with self._news:
+            ui.label(f"The report on model {job.payload['model'][:12]} is ready.")
+            ui.link("Open the report", report, new_tab=True).classes("studio-link")
+            ui.link("As PDF", f"{report}?format=pdf", new_tab=True).classes("studio-link")
+
+    async def _remove(self, model: Model) -> None:
+        with refusals():
+            await self._studio.service.delete(f"/models/{model.id}")
+            await self._list.look()
+            with self._news:
+                self._news.clear()
+                ui.label(f"Model {model.short} was removed.")
+                quiet_act("Undo", lambda: self._restore(model))
+
+    async def _restore(self, model: Model) -> None:
+        self._news.clear()
+        await self._do(f"/models/{model.id}/restore", {}, f"Model {model.short} is back.")
+
     async def _import(self, _name: str, content: bytes) -> None:
-        try:
-            found = await self._studio.service.post_file(
+        with refusals(self._notice.set_text):
+            document = await self._studio.service.post_file(
                 "/models/import", content, "application/octet-stream", create_subject=True
             )
-        except Refusal as refusal:
-            self._notice.set_text(str(refusal))
-            return
-        model = found["model"]
-        here = "was imported" if found["is_new"] else "was here already"
-        await self._look()
-        self._notice.set_text(f"Model {model['id'][:12]} of {model['subject']} {here}; it is not active.")
+            found = read(ImportedModel, document)
+            here = "was imported" if found.is_new else "was here already"
+            await self._list.look()
+            self._notice.set_text(
+                f"Model {found.model.short} of {found.model.subject} {here}; it is not active."
+            )
 
     async def _roll_back(self, subject: str, layout: str, hand: str | None) -> None:
         body = {"subject": subject, "layout": layout, "hand": hand}
         await self._do("/models/rollback", body, "The model that was active before is active again.")
 
     async def _do(self, path: str, body: Mapping[str, Any], done: str) -> None:
-        try:
+        with refusals():
             await self._studio.service.post(path, body)
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning")
-            return
-        ui.notify(done, position="bottom-right")
-        await self._look()
+            ui.notify(done, position="bottom-right")
+            await self._list.look()
 
 
-def _worn(model: Mapping[str, Any]) -> tuple[str, str, str | None]:
+def _worn(model: Model) -> tuple[str, str, str | None]:
     """Whose glove it reads: subject, layout and hand."""
-    return model["subject"], model["layout"], model["hand"]
+    return model.subject, model.layout, model.hand

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from nicegui import ui
 
+from glovecal_models.diagnosis.trial.answer import Candidate, TriedEffect
+from glovecal_models.improvement.answer import EffectAdded
+from glovecal_service.plain import read
+from glovecal_service.rest.job.answer import Job, JobFacts
+from glovecal_service.rest.model.answer import ModelInFull
+from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.findings.candidate_table import bar_key, candidate_table
 from glovecal_service.studio.findings.effect_view import EffectView
+from glovecal_service.studio.heading import main_act
 from glovecal_service.studio.job_watch import JobWatch
-from glovecal_service.studio.pages.model_select import model_select
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.studio import Studio
 
 WAIT_MS = 700
@@ -28,7 +31,6 @@ class OwnExpression:
     """One section of a page. Nothing is stored before the effect is added."""
 
     def __init__(self, studio: Studio, model: str) -> None:
-        """``model``: the id to begin with; "": the newest active one."""
         self._studio = studio
         self._service = studio.service
         self._model = model
@@ -36,10 +38,6 @@ class OwnExpression:
         self._busy = False
 
     async def build(self) -> None:
-        model = await model_select(self._service, self._model, self._choose)
-        if model is None:
-            return
-        self._model = model
         self._text = (
             ui.input("Expression", value=FIRST)
             .props(f"debounce={WAIT_MS} autocomplete=off spellcheck=false maxlength=2000")
@@ -58,18 +56,12 @@ class OwnExpression:
         await self._show_names()
         await self._try()
 
-    async def _choose(self, model: str) -> None:
-        self._model, self._tried = model, ""
-        await self._begin()
-
     async def _show_names(self) -> None:
         """Sensors and context columns of the model's takes."""
-        model = await self._service.get(f"/models/{self._model}")
-        takes = await self._service.get("/takes", subject=model["subject"])
-        context = {
-            f"c.{name}" for take in takes if take["layout"] == model["layout"] for name in take["context"]
-        }
-        sensors = dict.fromkeys(sensor for each in model["rotations"] for sensor in each["sensors"])
+        model = await self._service.read(ModelInFull, f"/models/{self._model}")
+        takes = await self._service.read(list[Take], "/takes", subject=model.subject)
+        context = {f"c.{name}" for take in takes if take.layout == model.layout for name in take.context}
+        sensors = dict.fromkeys(sensor for each in model.rotations for sensor in each.sensors)
         self._names.set_text(f"Recorded here: {', '.join([*sensors, *sorted(context)])}.")
 
     async def _try(self) -> None:
@@ -91,28 +83,25 @@ class OwnExpression:
         self._say("", "Trying it on left-out takes …")
         body = {"effect": {"declaration": text}}
         try:
-            found = await self._service.post(f"/models/{self._model}/try-effect", body)
+            found = await self._service.ask(TriedEffect, f"/models/{self._model}/try-effect", body)
         except Refusal as refusal:
             self._say(str(refusal), "")
             return
-        judged = found["judged"]
+        judged = found.judged
         if judged is None:
-            self._say(f"These takes cannot show it: {found['not_identifiable']}.", "")
+            self._say(f"These takes cannot show it: {found.not_identifiable}.", "")
             return
         self._say("", _verdict(judged))
         with self._result:
             candidate_table([judged])
             bar_key()
             view = EffectView(
-                self._service, {"declaration": text}, found["takes"], before=self._model, after=None
+                self._service, {"declaration": text}, found.takes, before=self._model, after=None
             )
-            where = judged["where"]
+            where = list(judged.where)
             if where:
-                ui.button(f"Add {found['effect']}", on_click=lambda: self._add(text, where)).props(
-                    "unelevated no-caps color=indigo-8"
-                ).classes("studio-main-act")
-        shares = judged["saved_share"]
-        await view.show(max(shares, key=lambda name: shares[name] or 0.0) if shares else None)
+                main_act(f"Add {found.effect}", lambda: self._add(text, where))
+        await view.show(judged.clearest_rotation)
 
     def _say(self, problem: str, verdict: str) -> None:
         self._problem.set_text(problem)
@@ -121,27 +110,23 @@ class OwnExpression:
 
     async def _add(self, text: str, where: list[str]) -> None:
         body = {"effect": {"declaration": text}, "rotations": where, "activate": False}
-        try:
-            job = await self._service.post(f"/models/{self._model}/effects", body)
-        except Refusal as refusal:
-            self._problem.set_text(str(refusal))
-            return
-        self._watch.follow(job["id"])
+        with refusals(self._problem.set_text):
+            job = await self._service.ask(JobFacts, f"/models/{self._model}/effects", body)
+            self._watch.follow(job.id)
 
-    async def _finished(self, job: Mapping[str, Any]) -> None:
-        if job["state"] == "done":
-            self._verdict.set_text(job["result"]["sentence"])
-            if job["result"]["model"]:
+    async def _finished(self, job: Job) -> None:
+        if job.state == "done":
+            found = read(EffectAdded, job.result)
+            self._verdict.set_text(found.sentence)
+            if found.model:
                 with self._result:
-                    ui.link("See the error fall", f"/fall?model={job['result']['model']}").classes(
-                        "studio-link"
-                    )
+                    ui.link("See the error fall", f"/fall?model={found.model}").classes("studio-link")
 
 
-def _verdict(judged: Mapping[str, Any]) -> str:
-    before, after, control = (judged[f"rmse_{name}_deg"] for name in ("before", "after", "control"))
+def _verdict(judged: Candidate) -> str:
+    before, after, control = judged.rmse_before_deg, judged.rmse_after_deg, judged.rmse_control_deg
     beside = "" if control is None else f" (control: {control:.2f})"
     change = f"On left-out takes the error goes from {before:.2f} to {after:.2f} degrees{beside}"
-    if judged["passes"]:
-        return f"{change}: significant on {', '.join(judged['where'])}."
+    if judged.passes:
+        return f"{change}: significant on {', '.join(judged.where)}."
     return f"{change}: not significant on any rotation."

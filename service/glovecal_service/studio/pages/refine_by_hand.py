@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from glovecal_service.rest.model.answer import ActivationView, Model, ModelInFull
 from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.pages.refined_video import RefinedVideo
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.studio import Studio
 
 LEAST_SCALE, MOST_SCALE, SCALE_STEP = 0.5, 2.0, 0.01
@@ -30,13 +30,15 @@ class RefineByHand:
 
     def __init__(self, studio: Studio, changed: Callable[[], Awaitable[None]]) -> None:
         self._studio, self._changed = studio, changed
-        self._model: dict[str, Any] = {}
+        self._model: Model | None = None
         self._served: list[tuple[float, float]] = [NEUTRAL]
         """Where the sliders stood at each version made here, the one that is served last."""
         self._replaced: set[str | None] = set()
         """Models that were served before a change made here."""
         self._doubted: str | None = None
         self._busy = False
+        self._is_due = False
+        """Whether a slider was released while another version was made."""
         with ui.expansion("Refine by hand").classes("refine") as self._part:
             ui.label(WHAT)
             self._rotation = ui.select([], label="Rotation", on_change=self._begin).classes("choice")
@@ -50,31 +52,35 @@ class RefineByHand:
             self._video = RefinedVideo(studio)
         self._part.set_visibility(False)
 
+    @property
+    def _id(self) -> str | None:
+        return None if self._model is None else self._model.id
+
     async def follow(self, model: str | None) -> None:
         """The model that is served now, or was when it was asked for."""
         if self._busy:
             return
-        if model == self._model.get("id"):
+        if model == self._id:
             self._doubted = None
             return
         if model in self._replaced and model != self._doubted:
             # The question may be older than the change; told a second time, it was taken back elsewhere.
             self._doubted = model
             return
-        self._model = {}
+        self._model = None
         self._begin()
         lines: list[str] = []
         if model is not None:
             try:
-                self._model = await self._studio.service.get(f"/models/{quote(model)}")
+                self._model = found = await self._studio.service.read(ModelInFull, f"/models/{quote(model)}")
             except Refusal:
                 self._part.set_visibility(False)
                 return
-            lines = _lines(self._model)
+            lines = _lines(found)
         kept = self._rotation.value if self._rotation.value in lines else next(iter(lines), None)
         self._rotation.set_options(lines, value=kept)
         self._part.set_visibility(bool(lines))
-        if lines:
+        if lines and self._model is not None:
             await self._video.follow(self._model)
 
     def _slider(self, label: str, least: float, most: float, step: float, neutral: float) -> ui.slider:
@@ -94,15 +100,16 @@ class RefineByHand:
     async def _apply(self) -> None:
         """Make the version at which the sliders stand out of the one that is served."""
         wanted, now = (self._scale.value or 1.0, self._offset.value or 0.0), self._served[-1]
+        self._is_due = self._busy
         if self._busy or wanted == now:
             return
         self._busy = True
-        rotation, before = self._rotation.value, self._model.get("id")
+        rotation, before = self._rotation.value, self._id
         scale = wanted[0] / now[0]
         change = {"scale": scale, "offset_deg": wanted[1] - scale * now[1]}
         body = {"rotations": {rotation: change}, "activate": True}
         try:
-            self._model = await self._studio.service.post(f"/models/{before}/refine", body)
+            self._model = await self._studio.service.ask(Model, f"/models/{before}/refine", body)
         except Refusal as refusal:
             self._said.set_text(str(refusal))
             self._stand(now)
@@ -117,6 +124,8 @@ class RefineByHand:
             await self._changed()
         finally:
             self._busy = False
+        if self._is_due:
+            await self._apply()
 
     def _begin(self) -> None:
         """From the served version on."""
@@ -137,26 +146,26 @@ class RefineByHand:
             self._busy = False
 
     async def _take_back(self) -> None:
-        which = {key: self._model.get(key) for key in ("subject", "layout", "hand")}
-        try:
-            back = await self._studio.service.post("/models/rollback", which)
-        except Refusal as refusal:
-            self._said.set_text(str(refusal))
+        model = self._model
+        if model is None:
             return
-        self._served = self._served[:-1] or [NEUTRAL]
-        self._stand(self._served[-1])
-        self._replaced.add(self._model.get("id"))
-        self._model = {**self._model, "id": back["model"]}
-        self._said.set_text(f"Taken back: {back['model'][:12]} is served again.")
-        await self._video.follow(self._model)
-        await self._changed()
+        which = {"subject": model.subject, "layout": model.layout, "hand": model.hand}
+        with refusals(self._said.set_text):
+            back = await self._studio.service.ask(ActivationView, "/models/rollback", which)
+            self._served = self._served[:-1] or [NEUTRAL]
+            self._stand(self._served[-1])
+            self._replaced.add(model.id)
+            self._model = model.model_copy(update={"id": back.model})
+            self._said.set_text(f"Taken back: {self._model.short} is served again.")
+            await self._video.follow(self._model)
+            await self._changed()
 
 
-def _lines(model: dict[str, Any]) -> list[str]:
+def _lines(model: ModelInFull) -> list[str]:
     """Rotations that may be refined: as REST would refuse the others."""
-    corrected = {rotation for effect in model["effect_details"] for rotation in effect["parameters"]}
+    corrected = {rotation for effect in model.effect_details for rotation in effect.parameters}
     return [
-        each["rotation"]
-        for each in model["rotations"]
-        if each["method"] == "linear" and each["rotation"] not in corrected
+        each.rotation
+        for each in model.rotations
+        if each.method == "linear" and each.rotation not in corrected
     ]

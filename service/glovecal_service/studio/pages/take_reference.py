@@ -9,9 +9,12 @@ from typing import Any
 
 from nicegui import ui
 
+from glovecal_models.takes.answer import TakeClock
+from glovecal_service.plain import read
+from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.file_button import FileButton
-from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Refusal
+from glovecal_service.studio.heading import act, heading, quiet_act
+from glovecal_service.studio.service import refusals
 from glovecal_service.studio.studio import Studio
 
 SHOWN_TAKES = 100
@@ -32,7 +35,7 @@ class TakeReference:
                 self._take = ui.select({}, label="Take").classes("choice")
                 self._clock = ui.select(
                     {"take": "seconds as in the take", "wall": "Unix seconds"}, value="take",
-                    label="Its time_s counts",
+                    label="Time column counts from",
                 ).classes("choice")  # fmt: skip
             with ui.element("div").classes("capture-acts"):
                 FileButton(
@@ -40,10 +43,8 @@ class TakeReference:
                     take=self._attach, tell=lambda sentence: self._told.set_text(sentence),
                 ).button.props("unelevated no-caps color=indigo-8").classes("studio-main-act")  # fmt: skip
                 for name, repair in (("Check its clock", False), ("Check and move the reference", True)):
-                    ui.button(name, on_click=partial(self._check, repair)).props("outline no-caps").classes(
-                        "studio-target"
-                    )
-                ui.button("Undo the move", on_click=self._undo).props("flat no-caps").classes("studio-target")
+                    act(name, partial(self._check, repair))
+                quiet_act("Undo the move", self._undo)
             self._told = ui.label("").classes("studio-notice").props('role="status"')
         await self._list()
 
@@ -52,11 +53,10 @@ class TakeReference:
         self._take.set_value(take)
 
     async def _list(self) -> None:
-        takes = (await self._studio.service.get("/takes"))[-SHOWN_TAKES:]
+        takes = await self._studio.service.read(list[Take], "/takes", reverse=True, limit=SHOWN_TAKES)
         names = {
-            each["id"]: f"{each['subject']}: {each['name']}"
-            + (", with reference" if each["rotations"] else "")
-            for each in reversed(takes)
+            each.id: f"{each.subject}: {each.name}" + (", with reference" if each.rotations else "")
+            for each in takes
         }
         self._take.set_options(names, value=self._take.value if self._take.value in names else None)
 
@@ -66,18 +66,16 @@ class TakeReference:
         if not self._take.value:
             self._told.set_text("Choose a take first.")
             return
-        try:
-            take = await self._studio.service.put_file(
+        with refusals(self._told.set_text):
+            document = await self._studio.service.put_file(
                 f"/takes/{self._take.value}/reference", content, kind,
                 clock=self._clock.value, filename=name,
             )  # fmt: skip
-        except Refusal as refusal:
-            self._told.set_text(str(refusal))
-            return
-        await self._list()
-        self._told.set_text(
-            f"{take['name']} has {len(take['rotations'])} measured rotations. Check its clock next."
-        )
+            await self._list()
+            take = read(Take, document)
+            self._told.set_text(
+                f"{take.name} has {len(take.rotations)} measured rotations. Check its clock next."
+            )
 
     async def _check(self, repair: bool) -> None:
         await self._ask_clock("/takes/clocks", {"repair": repair})
@@ -89,14 +87,12 @@ class TakeReference:
         if not self._take.value:
             self._told.set_text("Choose a take first.")
             return
-        try:
+        with refusals(self._told.set_text):
             found = await self._studio.service.post(path, {"takes": [self._take.value], **body})
-        except Refusal as refusal:
-            self._told.set_text(str(refusal))
-            return
-        said = [
-            each["sentence"] + (" Moved." if each["repaired"] else "")
-            for each in found
-            if isinstance(each, dict)
-        ]
-        self._told.set_text(" ".join(said) or ("Moved back." if found else "Nothing was moved."))
+            clocks = read(list[TakeClock | str], found)
+            said = [
+                each.sentence + (" Moved." if each.repaired else "")
+                for each in clocks
+                if isinstance(each, TakeClock)
+            ]
+            self._told.set_text(" ".join(said) or ("Moved back." if found else "Nothing was moved."))

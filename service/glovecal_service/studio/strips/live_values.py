@@ -15,8 +15,7 @@ class AngleList(Element, component="angle_list.js"):
     def __init__(self, feed: str, *, label: str) -> None:
         """``feed``: address of the live feed that a hand on the same page shows."""
         super().__init__()
-        self._props["feed"] = feed
-        self._props["label"] = label
+        self._props.update(feed=feed, label=label)
 
     def on_rotation(self, chosen: Callable[[str | None], Any]) -> None:
         """Call with the rotation that is chosen now, None when it is let go."""
@@ -36,7 +35,7 @@ class LiveTerms(Element, component="live_terms.js"):
 
     def __init__(self, *, label: str) -> None:
         super().__init__()
-        self._props["label"] = label
+        self._props.update(label=label)
 
     def begin(self, rotation: str | None) -> None:
         """With another rotation; None ends."""
@@ -56,5 +55,4 @@ class SensorStrips(Element, component="sensor_strips.js"):
 
     def __init__(self, feed: str, *, label: str) -> None:
         super().__init__()
-        self._props["feed"] = feed
-        self._props["label"] = label
+        self._props.update(feed=feed, label=label)

@@ -3,6 +3,7 @@ import { axis, tooltip } from "./index.js";
 
 export const LEFT = 64, RIGHT = 18; // of both plots, px
 export const LEAST_S = 0.2; // nothing shorter is shown
+const LETTER = 7; // px, of a take's name
 const TOP = { top: 50, height: 190 }, BELOW = { top: 276, height: 96 };
 
 /** What can be shown alone: [{key, label, colour}]. `lines`: a model each, {label, takes}. */
@@ -17,9 +18,9 @@ export function seriesOf(lines, shades) {
 
 /**
  * The option of ECharts. `lines` as above, their takes with `linked` seconds; `takes`: name, start_s, end_s, linked_s,
- * trained_on; `length`: linked seconds; `shown`: [from, to]; `alone`: the only series drawn, or null.
+ * trained_on; `length`: linked seconds; `shown`: [from, to]; `alone`: the only series drawn, or null; `width`: px.
  */
-export function overTime({ lines, takes, rotation, length, shown, alone }, shades, tip) {
+export function overTime({ lines, takes, rotation, length, shown, alone }, shades, width, tip) {
   const shows = (key) => alone === null || alone === key;
   const drawn = [];
   const line = (key, grid, colour, value, more) => drawn.push({
@@ -63,7 +64,7 @@ export function overTime({ lines, takes, rotation, length, shown, alone }, shade
         showDetail: false, borderColor: shades.line, textStyle: { color: shades.ink },
       },
     ],
-    series: [...drawn, bounds(takes, shades, 0), bounds(takes, shades, 1)],
+    series: [...drawn, ...[0, 1].map((grid) => bounds(takes, shades, grid, (take) => shortened(take, shown, width)))],
   };
 }
 
@@ -104,8 +105,16 @@ function band(takes, grid, colour, middle) {
   };
 }
 
+/** As much of its name as there is room for over the part of the take that is shown. */
+function shortened(take, [from, to], width) {
+  const seconds = Math.min(to, take.linked_s + take.end_s - take.start_s) - Math.max(from, take.linked_s);
+  const room = (seconds / (to - from)) * (width - LEFT - RIGHT);
+  const names = [take.name + (take.trained_on ? " (trained on)" : ""), take.name];
+  return names.find((name) => LETTER * (name.length + 1) <= room) ?? "";
+}
+
 /** Where takes begin and end, with their names; below, the line of no error. */
-function bounds(takes, shades, grid) {
+function bounds(takes, shades, grid, nameOf) {
   return {
     type: "line", xAxisIndex: grid, yAxisIndex: grid, data: [], silent: true,
     markArea: {
@@ -113,7 +122,7 @@ function bounds(takes, shades, grid) {
       label: { show: grid === 0, color: shades.ink, position: "insideTop", fontSize: 12 },
       data: takes.map((take, i) => [
         {
-          name: take.name + (take.trained_on ? " (trained on)" : ""), xAxis: take.linked_s,
+          name: nameOf(take), xAxis: take.linked_s,
           itemStyle: { color: shades.quiet, opacity: i % 2 ? 0.12 : 0.05 },
         },
         { xAxis: take.linked_s + take.end_s - take.start_s },

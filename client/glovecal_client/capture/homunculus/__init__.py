@@ -1,1 +1,0 @@
-"""LeRobot Homunculus: lines of sixteen numbers."""

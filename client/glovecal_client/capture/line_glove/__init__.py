@@ -1,1 +1,0 @@
-"""Any glove that sends lines of text, described by a TOML file alone."""

@@ -1,1 +1,0 @@
-"""OpenCyberGlove: binary packets with a checksum."""

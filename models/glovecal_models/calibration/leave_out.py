@@ -1,0 +1,304 @@
+"""Some takes left out, a calibration with its effects fitted on the others: its errors on those left out.
+
+One engine for all who ask: ``fits_without``. Masks over takes (``folds.py``) say what is left out: takes,
+wearings, or pieces of takes. Whether a part without which no model can be trained is passed over or ends the
+question is each one's own choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from glovecal_models.calibration.added_effect import EffectRequest
+from glovecal_models.calibration.effect_correction import EffectCorrection
+from glovecal_models.calibration.effect_fit import (
+    EffectFit,
+    Optima,
+    correspondence_for,
+    fit_with_effects,
+)
+from glovecal_models.calibration.folds import (
+    alone_in_their_motion,
+    are_short,
+    first_measured,
+    folds_over_takes,
+    pieces,
+    wearing_groups,
+)
+from glovecal_models.calibration.prepared_takes import OwnSignal, PreparedTakes
+from glovecal_models.calibration.training_settings import TrainingSettings, left_out_settings
+from glovecal_models.calibration.unseen_wearing import LeftOutWearing
+from glovecal_models.errors import NotTrainable
+from glovecal_models.progress import Cancel, Report
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """Squared errors of some rotations, summed over frames."""
+
+    square: dict[str, float]
+    """Degrees squared."""
+    count: dict[str, int]
+
+    def rmse_deg(self, rotation: str) -> float:
+        return float(np.sqrt(self.square[rotation] / max(self.count[rotation], 1)))
+
+    def with_those_of(self, other: HeldOutErrors) -> HeldOutErrors:
+        """These, replaced by the other's where it has any."""
+        return HeldOutErrors(self.square | other.square, self.count | other.count)
+
+    def of(self, rotations: Sequence[str]) -> HeldOutErrors:
+        """Those of some rotations."""
+        return HeldOutErrors(
+            {name: self.square[name] for name in rotations}, {name: self.count[name] for name in rotations}
+        )
+
+    @property
+    def overall_deg(self) -> float:
+        """RMSE over all rotations and frames."""
+        return float(np.sqrt(sum(self.square.values()) / max(sum(self.count.values()), 1)))
+
+
+class FitWithout(NamedTuple):
+    """A fit, and the takes that it has not seen."""
+
+    fit: EffectFit
+    left: PreparedTakes
+    number: int
+    """Of the mask that says what is left out."""
+
+
+def fits_without(
+    takes: PreparedTakes,
+    masks: Iterable[np.ndarray],
+    rotations: Sequence[str],
+    wanted: Sequence[EffectRequest],
+    settings: TrainingSettings,
+    *,
+    optima: Optima = (),
+    is_optional: bool = True,
+    before_each: Callable[[int], None] | None = None,
+    cancelled: Cancel | None = None,
+) -> Iterator[FitWithout]:
+    """A fit without the takes of each of ``masks`` (T,). Raises Cancelled.
+
+    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``). ``is_optional``: what cannot
+    carry a model without a mask's takes says nothing about the error and is passed over; else NotTrainable is
+    raised.
+    """
+    for number, held in enumerate(masks):
+        if before_each:
+            before_each(number)
+        kept = takes.some(np.flatnonzero(~held).tolist())
+        try:
+            fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
+        except NotTrainable:
+            if not is_optional:
+                raise
+            continue
+        yield FitWithout(fit, takes.some(np.flatnonzero(held).tolist()), number)
+
+
+def held_out_errors(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[EffectRequest],
+    settings: TrainingSettings,
+    *,
+    optima: Optima = (),
+    most_square: float = np.inf,
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
+) -> HeldOutErrors:
+    """Leave out whole takes, in ``settings.folds`` folds, at least two. Raises NotTrainable, Cancelled.
+
+    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``). Once squared errors exceed
+    ``most_square``, degrees squared over all rotations, the other folds are not fitted.
+
+    A single take, and short takes of one motion each, are left out in pieces; so is a take that is alone in
+    its motion, each piece with what came before it as its pre-roll.
+    """
+    square, count = dict.fromkeys(rotations, 0.0), dict.fromkeys(rotations, 0)
+    short = len(takes.takes) == 1 or are_short(
+        [
+            take.time_s[first_measured(known) :]
+            for take, known in zip(takes.takes, takes.reference, strict=True)
+        ]
+    )
+    number = np.arange(len(takes.takes))
+    parts, folds = takes, [fold.held_out for fold in folds_over_takes(number, max(settings.folds, 2))]
+    alone = alone_in_their_motion([take.name for take in takes.takes], [take.wearing for take in takes.takes])
+    if short:
+        parts, _, place = _cut(takes, [True] * len(number))
+        folds = [place == at for at in np.unique(place)]
+    elif any(alone):
+        parts, owner, place = _cut(takes, alone, with_history=True)
+        folds = [
+            np.where(np.array(alone)[owner], place % len(folds) == at, held[owner])
+            for at, held in enumerate(folds)
+        ]
+
+    def before_each(at: int) -> None:
+        if report:
+            so_far = np.sqrt(sum(square.values()) / max(sum(count.values()), 1))
+            told = f", error so far {so_far:.2f} degrees" if at else ""
+            report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
+
+    for fit, left, _ in fits_without(
+        parts, folds, rotations, wanted, settings, optima=optima, before_each=before_each, cancelled=cancelled
+    ):
+        for name, errors in errors_of(fit, left, rotations, settings).items():
+            square[name] += float(errors @ errors)
+            count[name] += len(errors)
+        if sum(square.values()) > most_square:
+            break
+    return HeldOutErrors(square, count)
+
+
+def held_out_take_errors(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[EffectRequest],
+    settings: TrainingSettings,
+    *,
+    folds: int,
+    optima: Optima = (),
+    cancelled: Cancel | None = None,
+    report: Report | None = None,
+) -> list[np.ndarray]:
+    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured.
+
+    Whole takes are left out in so many ``folds``. ``optima`` as in ``fits_without``. Raises NotTrainable,
+    Cancelled.
+    """
+    found, parts = [np.empty((0, 0))] * len(takes.takes), folds_over_takes(np.arange(len(takes.takes)), folds)
+
+    def before_each(at: int) -> None:
+        if report:
+            report(f"leaving out {parts[at].sentence}", at / len(parts))
+
+    for fit, left, number in fits_without(
+        takes, [part.held_out for part in parts], rotations, wanted, settings,
+        optima=optima, is_optional=False, before_each=before_each, cancelled=cancelled,
+    ):  # fmt: skip
+        held = np.flatnonzero(parts[number].held_out).tolist()
+        for at, errors in zip(held, frame_errors_of(fit, left, rotations, settings), strict=True):
+            found[at] = errors
+    return found
+
+
+def errors_of(
+    fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
+) -> dict[str, np.ndarray]:
+    """For each rotation the errors (predicted minus measured) of all measured frames, degrees."""
+    errors = np.concatenate(frame_errors_of(fit, takes, rotations, settings))
+    return {name: part[np.isfinite(part)] for name, part in zip(rotations, errors.T, strict=True)}
+
+
+def frame_errors_of(
+    fit: EffectFit, takes: PreparedTakes, rotations: Sequence[str], settings: TrainingSettings
+) -> list[np.ndarray]:
+    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured."""
+    base = {
+        name: OwnSignal.of(takes, correspondence_for(takes, name, settings), fit.regressor(name)).takes
+        for name in rotations
+    }
+    correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
+    targets = {name: takes.target(name) for name in rotations}
+    found = []
+    for number, take in enumerate(takes.takes):
+        mean = np.column_stack([base[name][number] for name in rotations])
+        readings = takes.readings[number]
+        mean += correction.of_take(take.time_s, mean, readings, take.context, take.wearing).degrees
+        found.append(mean - np.column_stack([targets[name][number] for name in rotations]))
+    return found
+
+
+def _cut(
+    takes: PreparedTakes, in_pieces: Sequence[bool], *, with_history: bool = False
+) -> tuple[PreparedTakes, np.ndarray, np.ndarray]:
+    """Takes in pieces as takes of their own, others whole; each one's take and its number within that.
+
+    ``with_history``: before what is measured of a piece stand the readings of the take up to there, so that
+    effects with a memory are where they were.
+    """
+    found, reference, owner, place = [], [], [], []
+    for index, (take, measured) in enumerate(zip(takes.takes, takes.reference, strict=True)):
+        parts = pieces(take.time_s, measured) if in_pieces[index] else [slice(0, len(take.time_s))]
+        deviations = take.reference_sd_at_frames(takes.layout.rotations)
+        for number, known in enumerate(part for part in parts if part.stop > part.start):
+            rows = slice(0, known.stop) if with_history else known
+            owner.append(index)
+            place.append(number)
+            before = np.full((known.start - rows.start, measured.shape[1]), np.nan)
+            reference.append(np.concatenate([before, measured[known]]))
+            found.append(
+                replace(
+                    take,
+                    name=f"{take.name}, part {number + 1}" if len(parts) > 1 else take.name,
+                    time_s=take.time_s[rows],
+                    readings=take.readings[rows],
+                    rotations=takes.layout.rotations,
+                    reference_time_s=take.time_s[known],
+                    reference=measured[known],
+                    reference_sd=None if deviations is None else deviations[known],
+                    context={name: values[rows] for name, values in take.context.items()},
+                    poses=None if take.poses is None else take.poses[rows],
+                )
+            )
+    prepared = PreparedTakes.of(found, takes.layout)
+    in_parts = replace(prepared, reference=tuple(reference), scale=takes.scale)
+    return in_parts, np.array(owner), np.array(place)
+
+
+def left_out_wearings(
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    wanted: Sequence[EffectRequest],
+    settings: TrainingSettings,
+    *,
+    optima: Optima = (),
+    cancelled: Cancel | None = None,
+) -> list[LeftOutWearing]:
+    """Empty with a single wearing. ``optima`` as in ``held_out_errors``. Raises Cancelled."""
+    wearings = [take.wearing for take in takes.takes]
+    settings, found, groups = left_out_settings(settings), [], wearing_groups(wearings)
+    masks = [np.array([name in group for name in wearings]) for group in groups]
+    for fit, _, number in fits_without(
+        takes, masks, rotations, wanted, settings, optima=optima, cancelled=cancelled
+    ):
+        trained = len(set(wearings) - set(groups[number]))
+        for wearing in groups[number]:
+            left = takes.some([at for at, name in enumerate(wearings) if name == wearing])
+            found += _left_out(fit, left, rotations, settings, wearing, trained)
+    return found
+
+
+def _left_out(
+    fit: EffectFit,
+    takes: PreparedTakes,
+    rotations: Sequence[str],
+    settings: TrainingSettings,
+    wearing: str,
+    trained: int,
+) -> list[LeftOutWearing]:
+    errors, found = errors_of(fit, takes, rotations, settings), []
+    for name in rotations:
+        regressor, each = fit.regressor(name), takes.inputs(correspondence_for(takes, name, settings))
+        variance = np.concatenate(
+            [
+                regressor.predict(part[np.isfinite(target)]).variance
+                for part, target in zip(each, takes.target(name), strict=True)
+                if np.isfinite(target).any()
+            ]
+            or [np.empty(0)]
+        )
+        if len(variance):
+            noise = float(regressor.noise_variance)
+            square, claimed = float(errors[name] @ errors[name]), float(variance.mean()) + noise
+            found.append(LeftOutWearing(name, wearing, trained, square, len(errors[name]), claimed, noise))
+    return found

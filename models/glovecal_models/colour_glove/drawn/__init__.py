@@ -1,1 +1,0 @@
-"""Hands in the colour glove, their motion and photographs, drawn: simulated, so that their truth is known."""

@@ -1,0 +1,1 @@
+"""A model and measurements over time."""

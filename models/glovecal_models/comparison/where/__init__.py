@@ -1,0 +1,1 @@
+"""Where a model fails: what its errors depend on, and how small they could get."""

@@ -1,0 +1,1 @@
+"""One effect, tried on a model's takes beside its control."""

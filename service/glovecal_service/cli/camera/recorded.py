@@ -1,0 +1,253 @@
+"""``glovecal camera estimates`` and ``shape``: what recordings of the colour glove give.
+
+Angles for a take's reference; and bone lengths and radii of the gloved hand.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from glovecal_models.errors import Cancelled
+from glovecal_service.cli.camera.tracking_options import TrackingOptions, camera_extra
+from glovecal_service.cli.terminal.options import AsJson
+from glovecal_service.cli.terminal.printing import Refusal, err, out, print_json, print_table
+from glovecal_service.cli.terminal.waiting import progress_bar
+from glovecal_service.operating_system import as_typed
+
+if TYPE_CHECKING:
+    from glovecal_models.progress import Cancel
+    from glovecal_service.camera.camera_settings import TrackingSettings
+    from glovecal_service.camera.recorded_estimates import Recordings, TrackedRecordings
+    from glovecal_service.camera.tracking_setup import TrackingSetup
+
+
+ESTIMATES = ("a file of estimates", ".npz")
+SHAPE = ("a shape", ".json")
+
+
+def estimates(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            help="A recording, or those of two cameras before the same hand: videos (.mkv with its times "
+            "beside it) or files of label images (.labels).",
+            exists=True,
+            dir_okay=False,
+            show_default=False,
+        ),
+    ],
+    file: Annotated[Path, typer.Option("--out", help="File of estimates to write (.npz).", dir_okay=False)],
+    tracking: TrackingOptions,
+    as_json: AsJson = False,
+) -> None:
+    """Track every frame of a recording and write what glovecal take camera makes a take's reference of.
+
+    Frames of two cameras are matched by their times; --calibration then holds both. Ctrl-C writes nothing.
+    """
+    with camera_extra():
+        from glovecal_models.takes.camera_estimates import write_estimates
+
+    with _set_up(recordings, file, ESTIMATES, tracking, quiet=as_json) as (_, recorded, setup, cancelled):
+        if not setup.is_calibrated:
+            err.print(
+                "The camera is not calibrated: focal length and distortion are assumed; "
+                "glovecal camera calibrate measures them."
+            )
+        with progress_bar(quiet=as_json) as report:
+            found = recorded.tracked(setup, tracking.stage.value, report, cancelled)
+        write_estimates(found.estimates, file)
+    if as_json:
+        print_json(_document(found, file))
+    else:
+        _print(found, file)
+
+
+def _print(found: TrackedRecordings, file: Path) -> None:
+    for each in found.counts:
+        left_out = {
+            "stamped twice": each.stamped_twice,
+            "without a frame of the other camera": each.unmatched,
+            "unreadable": each.unreadable,
+        }
+        said = "".join(f", {count} {what}" for what, count in left_out.items() if count)
+        out.print(f"{each.name}: {each.frames} frames at {each.rate_hz:.1f} Hz{said}.")
+        if each.ended:
+            out.print(f"  {each.ended}.")
+    said = found.estimates
+    frames = len(said.time_s)
+    out.print(
+        f"{frames} frames tracked in {found.took_s:.0f} s ({frames / found.took_s:.1f} frames/s): "
+        f"{found.without_hand} without a hand, {found.none_accepted} with a hand of which no rotation is "
+        f"accepted, {found.unusable} unusable{': ' + found.problem if found.problem else ''}."
+    )
+    for kind, count in found.findings.items():
+        out.print(f"{kind}: {count} frames, no rotation is accepted of them.")
+    columns = {
+        "rotation": "rotation",
+        "accepted": "accepted, % of frames",
+        "sd_accepted": "mean SD of accepted, degrees",
+        "sd": "mean SD of all, degrees",
+    }
+    rows = [
+        {
+            "rotation": row["rotation"],
+            "accepted": f"{100 * row['accepted_share']:.0f}",
+            "sd_accepted": _degrees(row["mean_sd_accepted_deg"]),
+            "sd": _degrees(row["mean_sd_deg"]),
+        }
+        for row in _rotations(found)
+    ]
+    print_table(rows, columns, empty="")
+    drawn = " The pictures were rendered: the estimates are marked as simulated." if said.simulated else ""
+    out.print(f"{100 * said.accepted.mean():.0f} % of all angles are accepted. Wrote {file}.{drawn}")
+    out.print(f"Next: glovecal take camera TAKE {as_typed(file)}")
+
+
+def _degrees(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _rotations(found: TrackedRecordings) -> list[dict[str, Any]]:
+    """Accepted share of all frames, and mean standard deviations in degrees; None: of no frame."""
+    said = found.estimates
+    rows = []
+    for column, name in enumerate(said.rotations):
+        sd, accepted = said.sd_deg[:, column], said.accepted[:, column]
+        known = sd[np.isfinite(sd)]
+        rows.append(
+            {
+                "rotation": name,
+                "accepted_share": float(accepted.mean()),
+                "mean_sd_accepted_deg": float(sd[accepted].mean()) if accepted.any() else None,
+                "mean_sd_deg": float(known.mean()) if len(known) else None,
+            }
+        )
+    return rows
+
+
+def _document(found: TrackedRecordings, file: Path) -> dict[str, Any]:
+    said = found.estimates
+    return {
+        "file": str(file),
+        "frames": len(said.time_s),
+        "simulated": said.simulated,
+        "recordings": [vars(each) for each in found.counts],
+        "without_hand": found.without_hand,
+        "none_accepted": found.none_accepted,
+        "unusable": found.unusable,
+        "problem": found.problem,
+        "findings": found.findings,
+        "seconds": found.took_s,
+        "accepted_share": float(said.accepted.mean()),
+        "rotations": _rotations(found),
+    }
+
+
+@contextmanager
+def _set_up(
+    recordings: list[Path], file: Path, kind: tuple[str, str], tracking: TrackingOptions, *, quiet: bool
+) -> Iterator[tuple[TrackingSettings, Recordings, TrackingSetup, Cancel]]:
+    """What the recordings are tracked with. ``kind``: what ``file`` is to be, and how its name ends.
+
+    Raises Refusal for a file that cannot be written, and once Ctrl-C has stopped it.
+    """
+    with camera_extra():
+        from glovecal_client.program import stopped_by_signals
+        from glovecal_service.camera.camera_settings import TrackingSettings
+        from glovecal_service.camera.recorded_estimates import Recordings
+        from glovecal_service.camera.tracking_setup import tracking_setup
+
+    what, suffix = kind
+    if file.suffix != suffix or not file.absolute().parent.is_dir():
+        raise Refusal(f"{file} cannot be written: {what} ends in {suffix}, in a folder that exists")
+    settings = TrackingSettings(**tracking.settings())
+    stop = threading.Event()
+    with stopped_by_signals(stop):
+        try:
+            recorded = Recordings(recordings)
+            with progress_bar(quiet=quiet) as report:
+                setup = tracking_setup(settings, recorded.sources, report, stop.is_set)
+            yield settings, recorded, setup, stop.is_set
+        except Cancelled as cancelled:
+            raise Refusal(f"stopped; nothing was written to {file}") from cancelled
+
+
+def shape(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            help="A recording, or those of two cameras before the same hand: at least 20 different poses, "
+            "slowly, the whole glove in view.",
+            exists=True,
+            dir_okay=False,
+            show_default=False,
+        ),
+    ],
+    file: Annotated[Path, typer.Option("--out", help="File of the shape to write (.json).", dir_okay=False)],
+    tracking: TrackingOptions,
+    as_json: AsJson = False,
+) -> None:
+    """Fit the hand's shape to 50 frames of a recording, for --shape of the verbs that track it.
+
+    One camera cannot tell a large hand from a near one: measure the hand's length (glovecal subject), or use
+    two calibrated cameras.
+    """
+    with camera_extra():
+        from glovecal_models.colour_glove.pose.hand_shape_fit import (
+            MEASURED_SIZE_SD,
+            SIZE_SD,
+            ShapeOnFile,
+            fitted_hand_shape,
+            write_shape,
+        )
+
+    with (
+        _set_up(recordings, file, SHAPE, tracking, quiet=as_json) as (settings, recorded, setup, cancelled),
+        progress_bar(quiet=as_json) as report,
+    ):
+        found = fitted_hand_shape(
+            setup.first, recorded.spread_labels(setup),
+            size_sd=MEASURED_SIZE_SD if "hand_length" in settings.sizes_mm else SIZE_SD,
+            report=report, cancelled=cancelled,
+        )  # fmt: skip
+    kept = ShapeOnFile(
+        setup.hand.skin.skeleton.hand, found.sizes_mm, found.radii_mm, found.size_sd, found.bones_sd
+    )
+    write_shape(file, kept)
+    if as_json:
+        print_json(
+            {
+                "file": str(file), "frames": len(found.used), "disagreeing_before": found.disagreeing_before,
+                "disagreeing": found.disagreeing, **vars(kept),
+            }
+        )  # fmt: skip
+        return
+    before = setup.hand.skin.skeleton.dimensions.sizes_mm
+    rows = [
+        {
+            "length": name,
+            "before": f"{before[name]:.1f}",
+            "found": f"{found.sizes_mm[name]:.1f}",
+            "sd": f"{sd * found.sizes_mm[name]:.1f}",
+        }
+        for name, sd in {"hand_length": found.size_sd, **found.bones_sd}.items()
+    ]
+    heads = {"length": "length", "before": "before, mm", "found": "found, mm", "sd": "standard deviation, mm"}
+    print_table(rows, heads, empty="")
+    out.print(
+        f"{len(found.used)} frames; colours that disagree: {100 * found.disagreeing_before:.1f} % of the "
+        f"glove's pixels before, {100 * found.disagreeing:.1f} % with the shape."
+    )
+    if len(recorded.sources) == 1:
+        out.print(
+            f"One camera leaves the size open by {100 * found.size_sd:.0f} %: distances from the camera are "
+            "as uncertain, angles are not."
+        )
+    out.print(f"Wrote {file}. Next: glovecal camera track SOURCE --glove GLOVE --shape {as_typed(file)}")

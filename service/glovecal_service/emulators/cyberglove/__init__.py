@@ -1,1 +1,0 @@
-"""An emulated CyberGlove I/II control box and its counts."""

@@ -1,0 +1,95 @@
+"""``overview``: what there is, and what to do next; for ``glovecal`` alone and pages with nothing to show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fastapi import APIRouter, Response
+
+from glovecal_models.presentation.document import counted
+from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.problem import problems, without_damaged
+from glovecal_service.rest.overview.answer import FIRST_STEPS, IMPORT, NextStep, Overview
+from glovecal_service.store.list_part import ListPart
+from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.store.store import Store
+
+router = APIRouter(prefix="/overview", tags=["health"])
+
+SHORT = 12
+LOOKED_AT = 500
+"""Of takes and of models, the newest ones: they say what is next."""
+
+
+@router.get("", response_model=Overview, summary="What there is, and what to do next", responses=problems())
+def get_overview(store: StoreNeeded, response: Response) -> Overview:
+    """Of the subject whose take or model is the newest."""
+    newest = ListPart(LOOKED_AT, reverse=True)
+    takes = without_damaged(response, lambda: store.takes.list(part=newest))[::-1]
+    models = without_damaged(response, lambda: store.models.list(part=newest))[::-1]
+    every_take, every_model = store.takes.count(), store.models.count()
+    subjects = store.subjects.list()
+    active = {model.id for model in store.models.all_active()}
+    teaching = [take for take in takes if take.teaches]
+    facts = [
+        counted(len(subjects), "subject"), counted(every_take, "take"),
+        f"{counted(every_model, 'model')}, {len(active)} active",
+    ]  # fmt: skip
+    return Overview(
+        subjects=len(subjects),
+        takes=every_take,
+        teaching_takes=len(teaching),
+        models=every_model,
+        active_models=len(active),
+        unfinished_jobs=sum(store.jobs.unfinished().values()),
+        sentence=", ".join(facts) + "." if takes or models else "Nothing is here yet.",
+        steps=_steps(store, takes, teaching, models, active),
+    )
+
+
+def _steps(
+    store: Store,
+    takes: Sequence[TakeRecord],
+    teaching: Sequence[TakeRecord],
+    models: Sequence[ModelRecord],
+    active: set[str],
+) -> list[NextStep]:
+    if not takes and not models:
+        return list(FIRST_STEPS)
+    newest = teaching[-1].created_at if teaching else None
+    if teaching and not (models and newest is not None and models[-1].created_at > newest):
+        subject = teaching[-1].subject
+        own = [take for take in teaching if take.subject == subject]
+        train = NextStep(
+            sentence=f"{counted(len(own), 'take')} of {subject} can teach a model.",
+            command=f"glovecal train --subject {subject}", page="takes", label="Train a model",
+        )  # fmt: skip
+        return [train, IMPORT]
+    if not models:
+        reference = NextStep(
+            sentence="No angles were measured yet: attach them to a take, or record poses with known angles.",
+            command=f"glovecal take reference {takes[-1].id[:SHORT]} FILE",
+            page="capture", label="Attach a reference",
+        )  # fmt: skip
+        return [reference, IMPORT]
+    return [*_of_model(store, models[-1], active), IMPORT]
+
+
+def _of_model(store: Store, model: ModelRecord, active: set[str]) -> list[NextStep]:
+    short = model.id[:SHORT]
+    jobs = store.jobs.list(subject=model.subject, part=ListPart(text=model.id))
+    diagnosed = any(
+        job.kind == "diagnose" and job.state == "done" and job.payload.get("model") == model.id
+        for job in jobs
+    )
+    diagnose = NextStep(
+        sentence=f"What model {short} of {model.subject} lacks "
+        + ("was found: add it, or record what decides." if diagnosed else "is not known yet."),
+        command=f"glovecal diagnose {short}", page=f"diagnose?model={model.id}",
+        label="See what is missing" if diagnosed else "Which effect is missing?",
+    )  # fmt: skip
+    activate = NextStep(
+        sentence=f"Model {short} is not active: live poses do not come from it.",
+        command=f"glovecal model activate {short}", page="models", label="Choose the live model",
+    )  # fmt: skip
+    return [diagnose] if model.id in active else [diagnose, activate]

@@ -1,0 +1,144 @@
+"""Takes as REST gives them, what is seen of them, and their videos."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import Field
+
+from glovecal_models.hand.rotations import Handedness
+from glovecal_models.takes.camera_estimates import CoveredRange
+from glovecal_models.takes.hand_clocks import How
+from glovecal_models.takes.take import ReferenceJump
+from glovecal_models.takes.take_check import RotationRange, SensorRange
+from glovecal_service.plain import Row
+
+
+class Take(Row):
+    id: str
+    name: str
+    subject: str
+    layout: str
+    wearing: str
+    source: str
+    artifact: str = Field(description="sha256 of the stored arrays.")
+    original_sha256: str | None = Field(description="sha256 of the uploaded file, which is kept.")
+    sensors: list[str]
+    rotations: list[str] = Field(description="Rotations with a reference.")
+    context: list[str]
+    frames: int
+    reference_rows: int
+    teaches: bool = Field(description="Whether a calibration can learn from it.")
+    known_hand: Handedness | None = Field(description="Which hand its glove is for; null: nobody said it.")
+    hand_shape: str | None = Field(
+        description="The session's shape that is held; methods template and two_shapes learn from it."
+    )
+    duration_s: float
+    simulated: bool
+    recording: str | None
+    state: Literal["complete", "repairing"] = Field(
+        description="`repairing`: frames of its recording may still be fetched from the capture log."
+    )
+    accounting: dict[str, Any] | None
+    facts: dict[str, Any]
+    created_at: datetime | None
+
+    @property
+    def line(self) -> str:
+        """Its name, wearing and length, for a list."""
+        return ", ".join(filter(None, (self.name, self.wearing, f"{self.duration_s:.0f} s")))
+
+    @property
+    def sent(self) -> int | None:
+        """Frames that the glove sent, where it was recorded here."""
+        return (self.accounting or {}).get("sent")
+
+
+class CheckView(Row):
+    take: Take
+    rate_hz: float | None = Field(description="By the median interval between frames.")
+    gaps: int = Field(description="Intervals in which frames are missing.")
+    longest_interval_s: float | None
+    repeated_frames: float = Field(description="Share of frames that are the same as the one before.")
+    frames_with_reference: float = Field(
+        description="Share of frames with at least one reference angle; the pre-roll is not counted."
+    )
+    pre_roll_frames: int = Field(description="Frames before the take was asked for.")
+    pre_roll_s: float
+    sensors: list[SensorRange]
+    rotations: list[RotationRange]
+    jumps: list[ReferenceJump] = Field(description="Where the reference jumps while the sensors do not.")
+    sentences: list[str] = Field(description="What looks wrong.")
+
+
+class ImportedTakes(Row):
+    takes: list[Take] = Field(description="All takes of the file, in its order.")
+    imported: list[str] = Field(description="Ids of those that are new.")
+    existing: list[str] = Field(description="Ids of those that the same file had brought before.")
+    replaced: list[str] = Field(description="Ids of those whose reference and names are now the file's.")
+    layout: str
+    original_sha256: str
+    warnings: list[str] = Field(description="What `check` says of the takes; like sentences once.")
+    subject_created: bool = Field(description="Whether the subject was not there before.")
+
+
+class UploadedFile(Row):
+    sha256: str = Field(description="The name to give where an upload is asked for.")
+    size: int = Field(description="Bytes.")
+
+
+class CameraReferenceView(Row):
+    take: Take
+    clock_offset_s: float = Field(description="Camera time less glove time; the reference is moved by it.")
+    clock_offset_sd_s: float = Field(description="Its standard deviation.")
+    accepted_share: float = Field(description="Of the camera's estimates.")
+    camera_ranges: list[CoveredRange] = Field(description="Angles outside of them are not judged.")
+    sentences: list[str]
+
+
+class SessionDriftView(Row):
+    shapes: list[str]
+    rms_deg: float | None = Field(description="Over shapes and rotations; null without a model.")
+    mean_deg: dict[str, float] = Field(description="By rotation, the mean over shapes, end less start.")
+    mean_counts: dict[str, float] = Field(description="By sensor.")
+    left_out: dict[str, str] = Field(description="Shapes that were not held, or not in both, and why.")
+    sentence: str
+
+
+class OwnClockView(Row):
+    """A glove's own clock against the capture computer's."""
+
+    kind: str = Field(description='"own" or "ltc".')
+    drift_ppm: float
+    drift_sd_ppm: float
+    sd_s: float
+    span_s: float
+
+
+class HandAlignmentView(Row):
+    how: How
+    shift_s: float = Field(description="Added to the second take's times at `at_s`, seconds.")
+    drift_ppm: float = Field(description="And so many millionths of the time since `at_s`.")
+    at_s: float
+    sd_s: float | None = Field(
+        description="Standard deviation of the shift; null where nothing was measured."
+    )
+    own_clocks: list[OwnClockView | None] = Field(description="Of each take, first and second.")
+    sentence: str
+
+
+class Video(Row):
+    take: str = Field(description="Id.")
+    name: str
+    source: str
+    simulated: bool = Field(description="Its pictures were drawn, not taken.")
+    times_s: list[float] = Field(description="Of each picture, by the take's clock.")
+    sentence: str
+
+
+class HandBeside(Row):
+    rotations: list[str]
+    degrees: list[list[float] | None] = Field(
+        description="Of the whole hand at each picture; null where the take has no frame within 0.1 s."
+    )

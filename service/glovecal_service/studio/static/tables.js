@@ -1,0 +1,30 @@
+// On a narrow page each row of a table is a card whose cells name their own columns, and the pages of the studio
+// are one line that scrolls (studio.css). What an address names after "#" is there only after the page was loaded.
+const AT_LEAST_MS = 300;
+
+let aim = location.hash.slice(1);
+
+function name() {
+  const wanted = aim && document.getElementById(aim);
+  if (wanted) { aim = ""; wanted.scrollIntoView(); }
+  for (const table of document.querySelectorAll("#main table")) {
+    const heads = [...table.querySelectorAll("thead th")].map(head => head.textContent);
+    for (const row of table.querySelectorAll("tbody tr"))
+      [...row.children].forEach((cell, at) => {
+        if (heads[at] !== undefined && cell.dataset.head !== heads[at]) cell.dataset.head = heads[at];
+      });
+  }
+}
+
+let waiting = 0;
+const again = () => { waiting ||= setTimeout(() => { waiting = 0; name(); }, AT_LEAST_MS); };
+new MutationObserver(again).observe(document.body, { childList: true, subtree: true });
+again();
+
+function showPage() {
+  document.querySelector(".studio-nav [aria-current]")?.scrollIntoView({ inline: "center", block: "nearest" });
+}
+
+addEventListener("load", showPage);
+addEventListener("resize", showPage);
+showPage();

@@ -1,0 +1,168 @@
+"""A recording of an unknown glove, dropped on a page: what it is, imported, trained, explained."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+from foreign_tables import laboratory, logger, semicolons
+from playwright.sync_api import Page, expect
+from studio_support import Open, serious
+
+from glovecal_client.rest import RestClient
+
+pytestmark = pytest.mark.needs_chromium
+MOST_CLICKS = 8
+JOB_PATIENCE_MS = 400_000
+"""For what a job makes, after those of other tests."""
+NAMED = "hysteresis"
+"""What a play between joint and strip is to Glovecal."""
+
+
+@pytest.fixture(scope="module")
+def client(address: str) -> Iterator[RestClient]:
+    with RestClient(address) as client:
+        yield client
+
+
+def drop(page: Page, files: Sequence[Path]) -> None:
+    """As from a file manager onto the middle of the page."""
+    page.locator(".q-uploader").wait_for(state="attached")
+    dropped = [{"name": file.name, "data": base64.b64encode(file.read_bytes()).decode()} for file in files]
+    page.evaluate(
+        """files => {
+            const dropped = new DataTransfer();
+            const bytes = file => Uint8Array.from(atob(file.data), c => c.charCodeAt(0));
+            for (const file of files)
+                dropped.items.add(new File([bytes(file)], file.name));
+            document.querySelector("#main").dispatchEvent(
+                new DragEvent("drop", {dataTransfer: dropped, bubbles: true, cancelable: true}));
+        }""",
+        dropped,
+    )
+
+
+class Clicks:
+    """Of the mouse, counted."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def on(self, page: Page, role: str, name: str) -> None:
+        what = page.get_by_role(role, name=name, exact=False)  # pyright: ignore[reportArgumentType]
+        what.first.click(timeout=JOB_PATIENCE_MS)
+        self.count += 1
+
+
+def from_the_drop_to_the_effect(page: Page, files: Sequence[Path], subject: str, takes: int) -> int:
+    """How many clicks it took."""
+    clicks = Clicks()
+    drop(page, files)
+    page.get_by_label("Whose takes").fill(subject)
+    clicks.on(page, "button", f"Import {takes} takes")
+    expect(page.get_by_role("heading", name=f"Train a model of {subject}")).to_be_visible()
+    clicks.on(page, "button", f"Train on {takes} takes")
+    clicks.on(page, "button", "Which effect is missing?")
+    clicks.on(page, "button", f"Add {NAMED}")
+    added = page.get_by_role("heading", name=f"{NAMED} was added")
+    expect(added).to_be_visible(timeout=JOB_PATIENCE_MS)
+    return clicks.count
+
+
+def test_a_foreign_table_becomes_a_model_and_its_effect(
+    opened: Open, client: RestClient, tmp_path: Path
+) -> None:
+    seen = opened("diagnose")
+    files = semicolons(tmp_path, 6, seconds=20.0)
+    assert from_the_drop_to_the_effect(seen.page, files, "dora", 6) <= MOST_CLICKS
+    *_, before, after = client.get("/models", {"subject": "dora"})
+    assert after["effects"] == [NAMED]
+    assert after["held_out_rmse_deg"] < 0.8 * before["held_out_rmse_deg"]
+    assert not before["active"], "nothing is activated unasked"
+    assert seen.complaints == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("write", [semicolons, laboratory])
+def test_twelve_takes_whose_columns_name_their_joints(
+    opened: Open, tmp_path: Path, write: Callable[..., list[Path]]
+) -> None:
+    page = opened("live").page
+    assert from_the_drop_to_the_effect(page, write(tmp_path), f"dora-{write.__name__}", 12) <= MOST_CLICKS
+
+
+def test_files_of_one_shape_are_read_alike_and_corrected_at_once(
+    opened: Open, client: RestClient, tmp_path: Path
+) -> None:
+    seen = opened("takes")
+    page = seen.page
+    drop(page, logger(tmp_path, 3, seconds=4.0))
+    expect(page.get_by_role("button", name="Import 3 takes")).to_be_enabled()
+    page.get_by_text("Columns: how they are read").click()
+    page.get_by_label("Name of joint1").fill("joint2")
+    expect(page.get_by_role("alert")).to_contain_text("would be r.joint2, as 'joint1' is")
+    expect(page.get_by_role("button", name="Import 0 takes")).to_be_disabled()
+    page.get_by_label("Name of joint1").fill("I_PIP")
+    expect(page.get_by_role("button", name="Import 3 takes")).to_be_enabled()
+    page.get_by_label("Whose takes").fill("emil")
+    page.get_by_role("button", name="Import 3 takes").click()
+    expect(page.get_by_role("button", name="Train on 3 takes")).to_be_visible()
+    takes = client.get("/takes", {"subject": "emil"})
+    assert [take["rotations"][1] for take in takes] == ["I_PIP"] * 3
+    assert [take["wearing"] for take in takes] == ["w1"] * 3
+    assert seen.complaints == []
+
+
+def test_wrong_files_get_a_sentence_each_and_the_right_one_is_shown(opened: Open, tmp_path: Path) -> None:
+    page = opened("compare").page
+    (tmp_path / "hand.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(64))
+    (tmp_path / "notes.txt").write_text("to do: glue the ring finger\n")
+    [right] = laboratory(tmp_path, 2, seconds=3.0)
+    rows = "".join(f"{i / 50},{7 * i % 70},{i % 90}.5\n" for i in range(90))
+    (tmp_path / "odd.csv").write_text(f'seconds,"x"" innerHTML=""<b>",angle\n{rows}')
+    drop(page, [tmp_path / "hand.png", right, tmp_path / "notes.txt", tmp_path / "odd.csv"])
+    expect(page.get_by_role("button", name="Import 2 takes")).to_be_visible()
+    expect(page.get_by_text("hand.png: not a table")).to_be_visible()
+    expect(page.get_by_text("notes.txt: no table of numbers")).to_be_visible()
+    page.get_by_text("Columns: how they are read").first.click()
+    expect(page.get_by_text("it counts the rows")).to_be_visible()
+    page.get_by_text("Columns: how they are read").last.click()
+    expect(page.get_by_label('Name of x" innerHTML="<b>', exact=True)).to_be_visible()
+    assert serious(page) == []
+
+
+def test_a_model_dropped_on_a_page_is_imported(opened: Open, client: RestClient, tmp_path: Path) -> None:
+    model = next(each for each in client.get("/models") if each["method"] == "lmc_gpr")
+    file = tmp_path / "hers.safetensors"
+    file.write_bytes(client.download(f"/models/{model['id']}/export"))
+    page = opened("jobs").page
+    drop(page, [file])
+    expect(page.get_by_text(f"of {model['subject']} was here already")).to_be_visible()
+
+
+def test_a_take_is_looked_at_with_another_over_it(opened: Open, client: RestClient) -> None:
+    first, *others = client.get("/takes")
+    second = next(each for each in others if each["subject"] == first["subject"])
+    seen = opened(f"take?id={first['id']}&beside={second['id']}")
+    page = seen.page
+    expect(page.get_by_role("heading", name=first["name"])).to_be_visible()
+    chart = page.get_by_role("img", name=f"Readings and reference of take {first['name']}")
+    page.wait_for_function(
+        "bands => document.querySelector('.take-plot canvas')?.clientHeight > 60 * bands",
+        arg=len(first["sensors"]) + len(first["rotations"]),
+    )
+    before = chart.screenshot()
+    page.get_by_role("button", name="Spectra of the readings").click()
+    page.wait_for_function(
+        "bands => document.querySelector('.take-plot canvas')?.clientHeight < 150 + 100 * bands",
+        arg=len(first["sensors"]),
+    )
+    assert chart.screenshot() != before
+    chosen = page.get_by_role("button", name="Spectra of the readings")
+    expect(chosen).to_have_css("background-color", "rgb(48, 63, 159)")  # its colour fades in
+    assert serious(page) == []
+    assert seen.complaints == []
+    missing = opened("take?id=0000").page
+    expect(missing.get_by_text("There is no take 0000.")).to_be_visible()
