@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 import zenoh
-from loopback import eventually, free_endpoint
+from loopback import eventually, free_endpoint, heard_of
 from test_cyberglove_driver import POSIX_ONLY, in_layout_order
 
 from glovecal_client import Frame, GloveKeys, Recording, decode_frame, open_router
@@ -52,14 +52,12 @@ def test_a_cyberglove_is_captured_and_comes_back_after_its_cable_was_pulled(emul
     sent = {tuple(in_layout_order(record, 22)) for record in emulator.box.records}
     assert all(tuple(frame.readings) in sent for frame in frames)
     assert all(frame.simulated for frame in frames)
-    _sequence_has_no_hole(frames)
     assert (summary.reconnects, summary.bad_frames, summary.duplicates) == (1, 0, 0)
     recording = Recording.open(summary.log)
     assert recording.meta["layout"] == "cyberglove22"
-    assert len(list(recording.frames())) == summary.frames
-
-
-def _sequence_has_no_hole(frames: list[Frame]) -> None:
-    numbers = [frame.sequence for frame in frames]
-    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    assert [frame.monotonic_ns for frame in frames] == sorted(frame.monotonic_ns for frame in frames)
+    kept = list(recording.frames())
+    assert [frame.sequence for frame in kept] == list(range(summary.frames))
+    assert [frame.monotonic_ns for frame in kept] == sorted(frame.monotonic_ns for frame in kept)
+    # A busy computer's network may drop a frame that is on disk: what was heard is a part of it, in order.
+    heard = [(frame.sequence, frame.monotonic_ns) for frame in frames]
+    assert [(frame.sequence, frame.monotonic_ns) for frame in heard_of(kept, frames)] == heard
