@@ -9,7 +9,7 @@ import zenoh
 from loopback import eventually, free_endpoint, heard_of
 from test_cyberglove_driver import POSIX_ONLY, in_layout_order
 
-from glovecal_client import Frame, GloveKeys, Recording, decode_frame, open_router
+from glovecal_client import GloveKeys, Recording, decode_frame, open_router
 from glovecal_client.capture.command import run_capture
 from glovecal_client.capture.daemon import CaptureSettings
 from glovecal_service.emulators.cyberglove import EmulatedBox
