@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from typing import Any, Literal
 
@@ -100,8 +101,9 @@ class Layout:
         return _from_document(document, source)
 
     @classmethod
+    @cache
     def built_in(cls, name: str) -> Layout:
-        """One of ``BUILT_IN``. Raises BadLayout."""
+        """One of ``BUILT_IN``, read once. Raises BadLayout."""
         if name not in BUILT_IN:
             raise BadLayout(f"no built-in layout {name!r}; {did_you_mean(name, BUILT_IN)}")
         return cls.from_toml(built_in_toml(name), source=name)

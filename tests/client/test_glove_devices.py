@@ -22,7 +22,7 @@ from glovecal_client.errors import DeviceLost
 from glovecal_models.layout import Layout
 from glovecal_service.emulators.catalogue import PROTOCOLS, faults_of
 from glovecal_service.emulators.cyberglove import EmulatedCyberGlove
-from glovecal_service.emulators.glove import EmulatedGlove
+from glovecal_service.emulators.glove import OFFSET_S, EmulatedGlove
 from glovecal_service.emulators.hand import MovingHand
 from glovecal_service.emulators.lines import DESCRIPTION
 from glovecal_service.emulators.opencyberglove import EmulatedOpenCyberGlove
@@ -307,7 +307,7 @@ def test_a_glove_clock_that_is_off_and_drifts_gives_times_of_now(
         opened(both.device)
         found = readings(both.device, 60)
         age_s = (time.monotonic_ns() - found[-1].monotonic_ns) / 1e9
-        assert 0 <= age_s < 0.3
+        assert 0 <= age_s < OFFSET_S / 10  # a busy computer may take a while to read
         steps_s = np.diff([reading.monotonic_ns for reading in found]) / 1e9
         assert np.median(steps_s) == pytest.approx(1 / both.device.rate_hz, rel=0.1)
 

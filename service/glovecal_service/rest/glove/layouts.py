@@ -133,7 +133,7 @@ def forget_latency(glove: NameInPath, store: StoreNeeded) -> GloveRecord:
 
 
 def _view(record: LayoutRecord) -> LayoutView:
-    layout = Layout.from_document(record.document)
+    layout = Layout.built_in(record.name) if record.built_in else Layout.from_document(record.document)
     return LayoutView(
         **vars(record), title=layout.title, sensors=list(layout.sensors), rotations=list(layout.rotations)
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -12,7 +11,7 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from glovecal_service.rest.glove.answer import Gloves, GloveView, LayoutView
+from glovecal_service.rest.glove.answer import GloveView, LayoutView
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.glove_state import GloveState
@@ -25,8 +24,6 @@ from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import fact_list
 
-LOOK_AGAIN_S = 3.0
-"""Models and wearers change elsewhere too."""
 LEAST_SHARE = 0.1
 """Of a sensor's counts it has to have gone through before the raw hand follows it."""
 LEAST_COUNTS = 20.0
@@ -48,14 +45,14 @@ FACTS = {
 class GloveCard:
     """State, hand, angles and readings; another model of the wearer is served from the next frame on."""
 
-    def __init__(self, studio: Studio, glove: str) -> None:
+    def __init__(self, studio: Studio, glove: str, look_again: Callable[[], Awaitable[None]]) -> None:
+        """``look_again``: what is to be done after the models were changed here."""
         self._studio = studio
         self._glove = glove
+        self._look_again = look_again
         self._worn: tuple[Any, ...] = ()
         self._models: dict[str, str] = {}
         self._active: str | None = None
-        self._served: str | None = None
-        self._looked_at = 0.0
         self._joint: ExplainedJoint | None = None
 
     @property
@@ -64,32 +61,25 @@ class GloveCard:
         subject, _, hand, _ = self._worn
         return subject or "\U0010ffff", {"left": 0, "right": 1}.get(hand, 2), self._glove
 
-    async def build(self) -> None:
+    async def build(self, glove: GloveView | None) -> None:
+        """``glove``: as the service knows it, None before anything was said of it."""
         self.section = ui.element("section").classes("glove")
         self.section.props["aria-label"] = f"Glove {self._glove}"
-        await self._fill(await self._seen())
+        await self._fill(glove)
 
     def move_to(self, place: int) -> None:
         """Among the cards of the page."""
         self.section.move(target_index=place)
 
-    async def look(self, state: GloveState) -> None:
-        """Show ``state``, and what was changed elsewhere: the wearer, the models and which one is active."""
-        is_late = time.monotonic() - self._looked_at > LOOK_AGAIN_S
-        if is_late or state.model != self._served:
-            self._served = state.model
-            with suppress(Refusal):  # the database may be away for a moment; the state is shown all the same
-                await self._follow()
-        self._show(state)
-
-    async def _follow(self) -> None:
-        glove = await self._seen()
+    async def follow(self, glove: GloveView | None) -> None:
+        """Show what was changed elsewhere: the wearer, the models and which one is active."""
         if _worn(glove) == self._worn:
             await self._offer_models(glove)
         else:
             await self._fill(glove)
 
-    def _show(self, state: GloveState) -> None:
+    def look(self, state: GloveState) -> None:
+        """Show the state of this moment."""
         self._word.set_text(state.word + (", simulated" if state.is_simulated else ""))
         if self._word.props.get("data-word") != state.word:
             for element in (self._word, self.section):
@@ -132,7 +122,7 @@ class GloveCard:
                     ).classes("glove-hand")  # fmt: skip
                     self._view_acts(view, reads, least)
                     self._joint = ExplainedJoint(self._studio, self._glove, view)
-                    self._refine = RefineByHand(self._studio, self._follow)
+                    self._refine = RefineByHand(self._studio, self._look_again)
                 with ui.element("div").classes("glove-values"):
                     self._joint.choose_in(AngleList(feed, label="Angles and their standard deviations"))
                     heading(3, "Readings, last 6 s")
@@ -160,12 +150,6 @@ class GloveCard:
     def _show_raw(self, view: HandView, reads: Mapping[str, str], least: float, shown: bool) -> None:
         view.raw(reads, least=least, shown=shown)
         self._raw_is.set_visibility(shown)
-
-    async def _seen(self) -> GloveView | None:
-        """None before anything was said of it."""
-        self._looked_at = time.monotonic()
-        seen = (await self._studio.service.read(Gloves, "/gloves")).seen
-        return next((each for each in seen if each.name == self._glove), None)
 
     async def _skeleton(self, glove: GloveView | None) -> dict[str, Any]:
         """Of the wearer, else of a hand of usual size."""

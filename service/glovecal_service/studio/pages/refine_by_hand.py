@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from functools import partial
 from urllib.parse import quote
@@ -36,9 +37,8 @@ class RefineByHand:
         self._replaced: set[str | None] = set()
         """Models that were served before a change made here."""
         self._doubted: str | None = None
-        self._busy = False
-        self._is_due = False
-        """Whether a slider was released while another version was made."""
+        self._changing = asyncio.Lock()
+        """A slider released, or Undo pressed, while another version is made waits for it."""
         with ui.expansion("Refine by hand").classes("refine") as self._part:
             ui.label(WHAT)
             self._rotation = ui.select([], label="Rotation", on_change=self._begin).classes("choice")
@@ -58,7 +58,7 @@ class RefineByHand:
 
     async def follow(self, model: str | None) -> None:
         """The model that is served now, or was when it was asked for."""
-        if self._busy:
+        if self._changing.locked():
             return
         if model == self._id:
             self._doubted = None
@@ -95,15 +95,14 @@ class RefineByHand:
     async def _released(self, slider: ui.slider, event: GenericEventArguments) -> None:
         """The value comes with the event: that of the slider may still be on its way."""
         slider.set_value(float(event.args))
-        await self._apply()
+        async with self._changing:
+            await self._apply()
 
     async def _apply(self) -> None:
         """Make the version at which the sliders stand out of the one that is served."""
         wanted, now = (self._scale.value or 1.0, self._offset.value or 0.0), self._served[-1]
-        self._is_due = self._busy
-        if self._busy or wanted == now:
+        if wanted == now:
             return
-        self._busy = True
         rotation, before = self._rotation.value, self._id
         scale = wanted[0] / now[0]
         change = {"scale": scale, "offset_deg": wanted[1] - scale * now[1]}
@@ -122,10 +121,6 @@ class RefineByHand:
             )
             await self._video.follow(self._model)
             await self._changed()
-        finally:
-            self._busy = False
-        if self._is_due:
-            await self._apply()
 
     def _begin(self) -> None:
         """From the served version on."""
@@ -137,13 +132,8 @@ class RefineByHand:
         self._offset.set_value(at[1])
 
     async def _undo(self) -> None:
-        if self._busy:
-            return
-        self._busy = True
-        try:
+        async with self._changing:
             await self._take_back()
-        finally:
-            self._busy = False
 
     async def _take_back(self) -> None:
         model = self._model
