@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from glovecal_service.plain import read
 from glovecal_service.rest.overview.answer import Overview
+from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.heading import heading, quiet_act
-from glovecal_service.studio.service import Service
+from glovecal_service.studio.service import Refusal, Service
 
 
-async def next_steps(service: Service) -> ui.element:
-    """A section that can be hidden."""
-    found = read(Overview, await service.get("/overview"))
+async def next_steps(service: Service, about: Chosen | None = None) -> ui.element:
+    """A section that can be hidden. ``about``: whose steps, and of which model; None: of the newest."""
+    found = await _overview(service, about)
     with ui.element("section").classes("finding next-steps").props('aria-label="What to do next"') as section:
         heading(2, "What to do next")
         ui.label(found.sentence)
@@ -25,6 +27,26 @@ async def next_steps(service: Service) -> ui.element:
                 ui.label(step.sentence)
                 command_to_copy(step.command)
     return section
+
+
+async def next_step(service: Service, about: Chosen, here: str) -> None:
+    """The usual one in a line, for a page that has more to show; ``here`` is its address."""
+    with suppress(Refusal):  # the page itself says what is wrong
+        step = (await _overview(service, about)).steps[0]
+        with ui.element("div").classes("next-in-a-line").props('role="note" aria-label="Next step"'):
+            ui.label("Next:")
+            ui.label(step.sentence)
+            if step.page.partition("?")[0] != here:
+                ui.link(step.label, f"/{step.page}").classes("studio-link")
+
+
+async def _overview(service: Service, about: Chosen | None) -> Overview:
+    query: dict[str, str] = {}
+    if about is not None and about.person:
+        query["subject"] = about.person
+        if about.model is not None:
+            query["model"] = about.model.id
+    return read(Overview, await service.get("/overview", **query))
 
 
 def connect_or_try() -> None:

@@ -15,7 +15,7 @@ from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.chosen import Chosen, chosen
 from glovecal_service.studio.drop import DropZone
 from glovecal_service.studio.heading import heading, quiet_act
-from glovecal_service.studio.next_steps import next_steps
+from glovecal_service.studio.next_steps import next_step, next_steps
 from glovecal_service.studio.service import Refusal, Service, refusals
 from glovecal_service.studio.studio import Studio
 
@@ -52,7 +52,7 @@ class Around:
         if self.chosen.model is None:
             whose = f" of {self.chosen.person}" if self.chosen.person else ""
             ui.label(f"No model{whose} yet.").classes("studio-notice")
-            await next_steps(service)
+            await next_steps(service, self.chosen)
         return self.chosen.model
 
 
@@ -84,6 +84,7 @@ async def shell(
         heading(1, title)
         if about.notice:
             ui.label(about.notice).classes("studio-notice").props('role="status"')
+        await next_step(studio.service, about, here)
         yield Around(DropZone(studio), about)
     drawer.start()
 

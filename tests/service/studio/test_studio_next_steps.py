@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from foreign_tables import semicolons
 from playwright.sync_api import expect
-from realtime_support import free_endpoint, part_of_service
+from realtime_support import WireGlove, eventually, free_endpoint, part_of_service
 from studio_support import Open, serious
+from test_studio_pages import PAGES
 
 from glovecal_client.rest import RestClient
-from glovecal_service.serve import web
+from glovecal_client.session import open_client
+from glovecal_service.serve import real_time, web
 from glovecal_service.settings import Settings
 
 pytestmark = pytest.mark.needs_chromium
 WITHOUT_A_MODEL = ["compare", "diagnose", "fall", "models"]
+EVERY_PAGE = [*PAGES, "jobs"]
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +43,62 @@ def test_with_nothing_there_are_four_ways_in(opened: Open, empty: str, name: str
     assert serious(page) == []
 
 
+@pytest.fixture(scope="module")
+def with_a_glove(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A service that saw a glove, and nothing else."""
+    port = int(free_endpoint().rpartition(":")[2])
+    settings = Settings(
+        data=tmp_path_factory.mktemp("glove") / "data", zenoh=free_endpoint(), port=port, workers=1
+    )
+    with part_of_service(real_time, settings), part_of_service(web, settings):
+        address = f"http://127.0.0.1:{port}"
+        with open_client([settings.zenoh], wait_s=60) as session:
+            glove = WireGlove(session, settings, "g1", subject=None)
+            with RestClient(address) as client:
+
+                def seen() -> bool:
+                    glove.say_meta()
+                    return bool(client.get("/gloves")["seen"])
+
+                eventually(seen, "the glove is seen")
+            yield address
+
+
+def steps(opened: Open, at: str, query: str = "") -> Iterator[tuple[str, str, str]]:
+    """Of every page: its name, what it says comes next, and where its button leads, "" where it has none."""
+    page = opened("start", at=at).page
+    for name in EVERY_PAGE:
+        page.goto(f"{at}/studio/{name}{query}")
+        line = page.get_by_role("note", name="Next step")
+        either = line.or_(page.get_by_role("region", name="What to do next"))
+        shown = either.locator("visible=true").first
+        expect(shown).to_be_visible()
+        link = shown.get_by_role("link")
+        says, leads = shown.inner_text(), ""
+        if link.count():
+            expect(link.first).to_have_attribute("href", re.compile("^/studio/"))
+            leads = link.first.get_attribute("href") or ""
+        yield name, says, leads
+
+
+def test_with_nothing_every_page_says_what_is_next(opened: Open, empty: str) -> None:
+    for name, says, leads in steps(opened, empty):
+        assert "Drop a recording of a glove on any page of the studio." in says, name
+        assert leads == ("" if name == "takes" else "/studio/takes") or "Connect a glove" in says, name
+
+
+def test_with_a_glove_every_page_says_how_to_calibrate_it(opened: Open, with_a_glove: str) -> None:
+    for name, says, leads in steps(opened, with_a_glove):
+        assert "Glove g1 has no calibration yet: hold poses with known angles." in says, name
+        assert leads == ("" if name == "capture" else "/studio/capture"), name
+
+
+def test_with_a_model_every_page_says_what_it_lacks(opened: Open, address: str, trained: str) -> None:
+    for name, says, leads in steps(opened, address, f"?model={trained}"):
+        assert f"What model {trained[:12]} of " in says, name
+        assert leads == ("" if name == "diagnose" else f"/studio/diagnose?model={trained}"), name
+
+
 def test_with_takes_the_next_step_is_training(opened: Open, empty: str, tmp_path: Path) -> None:
     [path] = semicolons(tmp_path, 4, seconds=3.0)
     with RestClient(empty) as client:
@@ -46,6 +106,9 @@ def test_with_takes_the_next_step_is_training(opened: Open, empty: str, tmp_path
         seen = client.post("/takes/preview", file)
         body = {"subject": "dora", "create_subject": True, "mapping": seen["mapping"]}
         client.post("/takes/import", file | body)
+    for name, says, leads in steps(opened, empty):
+        assert "4 takes of dora can teach a model." in says, name
+        assert leads == ("" if name == "takes" else "/studio/takes"), name
     for name in WITHOUT_A_MODEL:
         page = opened(name, at=empty).page
         expect(page.get_by_text("glovecal train --subject dora", exact=True)).to_be_visible()

@@ -3,34 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 
 from glovecal_models.presentation.document import counted
+from glovecal_service.request_types import SubjectName
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.problem import problems, without_damaged
-from glovecal_service.rest.overview.answer import FIRST_STEPS, IMPORT, NextStep, Overview
+from glovecal_service.rest.overview.answer import DEMO, FIRST_STEPS, IMPORT, NextStep, Overview
 from glovecal_service.store.list_part import ListPart
-from glovecal_service.store.records import ModelRecord, TakeRecord
+from glovecal_service.store.records import GloveRecord, ModelRecord, TakeRecord
 from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/overview", tags=["health"])
 
 SHORT = 12
+MOST_GLOVES = 3
+"""Without a calibration that are told of."""
 LOOKED_AT = 500
 """Of takes and of models, the newest ones: they say what is next."""
 
 
 @router.get("", response_model=Overview, summary="What there is, and what to do next", responses=problems())
-def get_overview(store: StoreNeeded, response: Response) -> Overview:
-    """Of the subject whose take or model is the newest."""
+def get_overview(
+    store: StoreNeeded,
+    response: Response,
+    subject: SubjectName | None = None,
+    model: Annotated[str | None, Query(max_length=64, description="None: the newest.")] = None,
+) -> Overview:
+    """Of everybody: the steps are those of whose take or model is the newest. Of one subject: its own."""
     newest = ListPart(LOOKED_AT, reverse=True)
-    takes = without_damaged(response, lambda: store.takes.list(part=newest))[::-1]
-    models = without_damaged(response, lambda: store.models.list(part=newest))[::-1]
-    every_take, every_model = store.takes.count(), store.models.count()
-    subjects = store.subjects.list()
-    active = {model.id for model in store.models.all_active()}
+    takes = without_damaged(response, lambda: store.takes.list(subject=subject, part=newest))[::-1]
+    models = without_damaged(response, lambda: store.models.list(subject=subject, part=newest))[::-1]
+    every_take = store.takes.count(subject=subject)
+    every_model = store.models.count(subject=subject)
+    subjects = [each for each in store.subjects.list() if subject in (None, each.name)]
+    active = {model.id for model in store.models.all_active() if subject in (None, model.subject)}
     teaching = [take for take in takes if take.teaches]
+    seen = without_damaged(response, store.gloves.list)
+    gloves = [glove for glove in seen if subject is None or glove.subject in (None, subject)]
     facts = [
         counted(len(subjects), "subject"), counted(every_take, "take"),
         f"{counted(every_model, 'model')}, {len(active)} active",
@@ -43,21 +55,23 @@ def get_overview(store: StoreNeeded, response: Response) -> Overview:
         active_models=len(active),
         unfinished_jobs=sum(store.jobs.unfinished().values()),
         sentence=", ".join(facts) + "." if takes or models else "Nothing is here yet.",
-        steps=_steps(store, takes, teaching, models, active),
+        steps=_steps(store, takes, [*models, *([store.models.get(model)] if model else [])], active, gloves),
     )
 
 
 def _steps(
     store: Store,
     takes: Sequence[TakeRecord],
-    teaching: Sequence[TakeRecord],
     models: Sequence[ModelRecord],
     active: set[str],
+    gloves: Sequence[GloveRecord],
 ) -> list[NextStep]:
-    if not takes and not models:
-        return list(FIRST_STEPS)
+    """Takes: the newest last. Models: the one that is looked at last."""
+    teaching = [take for take in takes if take.teaches]
     newest = teaching[-1].created_at if teaching else None
-    if teaching and not (models and newest is not None and models[-1].created_at > newest):
+    if models and (newest is None or any((model.created_at or newest) >= newest for model in models)):
+        return [*_of_model(store, models[-1], active), IMPORT]
+    if teaching:
         subject = teaching[-1].subject
         own = [take for take in teaching if take.subject == subject]
         train = NextStep(
@@ -65,14 +79,25 @@ def _steps(
             command=f"glovecal train --subject {subject}", page="takes", label="Train a model",
         )  # fmt: skip
         return [train, IMPORT]
-    if not models:
+    calibrate = [_calibrate(glove) for glove in gloves[:MOST_GLOVES]]
+    if takes:
         reference = NextStep(
             sentence="No angles were measured yet: attach them to a take, or record poses with known angles.",
             command=f"glovecal take reference {takes[-1].id[:SHORT]} FILE",
-            page="capture", label="Attach a reference",
+            page=f"take?id={takes[-1].id}", label="Attach a reference",
         )  # fmt: skip
-        return [reference, IMPORT]
-    return [*_of_model(store, models[-1], active), IMPORT]
+        return [*calibrate, reference, IMPORT]
+    return [*calibrate, IMPORT, DEMO] if calibrate else list(FIRST_STEPS)
+
+
+def _calibrate(glove: GloveRecord) -> NextStep:
+    whose = f" of {glove.subject}" if glove.subject else ""
+    return NextStep(
+        sentence=f"Glove {glove.name}{whose} has no calibration yet: hold poses with known angles.",
+        command=f"glovecal sample --glove {glove.name}",
+        page=f"capture?who={glove.subject}" if glove.subject else "capture",
+        label="Calibrate this hand",
+    )
 
 
 def _of_model(store: Store, model: ModelRecord, active: set[str]) -> list[NextStep]:

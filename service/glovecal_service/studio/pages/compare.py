@@ -75,7 +75,7 @@ class ComparePage:
         choice = first_choice(models, takes, wanted, on)
         if choice is None:
             ui.label(NOTHING).classes("studio-notice compare-notice").props('role="status"')
-            await next_steps(self._service)
+            await next_steps(self._service, about)
             return
         self._bar = ChoiceBar(models, takes, choice, self._show)
         self._walk = HiddenWalk(self._service)

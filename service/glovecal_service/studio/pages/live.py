@@ -11,6 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
 from glovecal_service.rest.glove.answer import Gloves
+from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.next_steps import connect_or_try, next_steps
 from glovecal_service.studio.pages.glove_card import GloveCard
@@ -30,9 +31,9 @@ def add(studio: Studio) -> None:
     @page("/")
     @page("/live")
     async def live() -> None:
-        async with shell(studio, "live", "Live"):
+        async with shell(studio, "live", "Live") as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/compare.css">')
-            await LivePage(studio).build()
+            await LivePage(studio).build(around.chosen)
 
 
 class LivePage:
@@ -44,13 +45,13 @@ class LivePage:
         self._served: dict[str, str | None] = {}
         self._looked_at = 0.0
 
-    async def build(self) -> None:
+    async def build(self, about: Chosen) -> None:
         self._notice = ui.label("").classes("studio-notice").props('role="status"')
         self._gloves = ui.element("div").classes("gloves")
         self._next = ui.element("div")
         with self._next:
             connect_or_try()
-            await next_steps(self._studio.service)
+            await next_steps(self._studio.service, about)
         await self._look()
         ui.timer(EVERY_S, self._look)
 
