@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, ViewportSize
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -24,6 +24,8 @@ from glovecal_service.serve import real_time, web
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
+DESKTOP: ViewportSize = {"width": 1280, "height": 800}
+TABLET: ViewportSize = {"width": 768, "height": 1024}
 HARMLESS = "GPU stall due to ReadPixels"
 
 
@@ -81,14 +83,16 @@ def _nothing_left_behind() -> Iterator[None]:
 
 @pytest.fixture
 def opened(browser: Browser, address: str) -> Iterator[Open]:
-    """``opened("live")``: the page once its heading is there; ``at`` is another service's address."""
+    """``opened("live")``: the page once its heading is there; ``at`` is another service's address. On a
+    ``tablet`` there is no mouse, and it is held upright."""
     contexts = []
 
-    def open_page(name: str, at: str = address) -> Opened:
+    def open_page(name: str, at: str = address, *, tablet: bool = False) -> Opened:
         # A quarter of the pixels each way: the processor draws them all.
         context = browser.new_context(
-            viewport={"width": 1280, "height": 800}, device_scale_factor=0.25, color_scheme="light"
-        )
+            viewport=TABLET if tablet else DESKTOP, has_touch=tablet, is_mobile=tablet,
+            device_scale_factor=0.25, color_scheme="light",
+        )  # fmt: skip
         context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)
         seen = Opened(context.new_page())

@@ -1,8 +1,8 @@
 """The heart of the studio, walked in a real browser: where a model fails, what it lacks, adding it, its fall.
 
-The glove sticks, and no model knows it. Once by mouse and once by keyboard alone, against the running service
-with the glove's capture as a process. Pictures of each page go to the folder named by GLOVECAL_SCREENSHOTS,
-or to the test's own temporary folder.
+The glove sticks, and no model knows it. Once by mouse, once by touch on a tablet held upright and once by
+keyboard alone, against the running service with the glove's capture as a process. Pictures of each page go to
+the folder named by GLOVECAL_SCREENSHOTS, or to the test's own temporary folder.
 """
 
 from __future__ import annotations
@@ -56,6 +56,11 @@ class Mouse:
         what.click()
 
 
+class Finger:
+    def choose(self, what: Locator) -> None:
+        what.tap()
+
+
 class Keyboard:
     """From where the focus is, forward to what is wanted."""
 
@@ -94,20 +99,23 @@ def story(settings: Settings, address: str, tmp_path_factory: pytest.TempPathFac
         yield Story(client, model)
 
 
-@pytest.mark.parametrize("by", ["mouse", pytest.param("keyboard", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("by", ["mouse", "touch", pytest.param("keyboard", marks=pytest.mark.slow)])
 def test_the_missing_effect_is_seen_named_added_and_live(
     opened: Open, story: Story, tmp_path: Path, by: str
 ) -> None:
     story.client.post(f"/models/{story.model}/activate")
-    seen = opened(f"compare?models={story.model[:12]}")
+    seen = opened(f"compare?models={story.model[:12]}", tablet=by == "touch")
     page = seen.page
     main = page.locator("#main")
-    person: Person = Mouse() if by == "mouse" else Keyboard(page)
+    people: dict[str, Person] = {"mouse": Mouse(), "touch": Finger(), "keyboard": Keyboard(page)}
+    person = people[by]
     kept = Path(os.environ.get("GLOVECAL_SCREENSHOTS") or tmp_path)
     kept.mkdir(parents=True, exist_ok=True)
 
     def picture(name: str) -> None:
         page.screenshot(path=kept / f"{by}-{name}.png", full_page=True)
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert wide <= 0, f"{name} is cut at the side"
 
     stretch = main.get_by_role("button").filter(has_text="over all rotations")
     stretch.first.wait_for()
