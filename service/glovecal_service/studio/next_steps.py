@@ -29,15 +29,23 @@ async def next_steps(service: Service, about: Chosen | None = None) -> ui.elemen
     return section
 
 
-async def next_step(service: Service, about: Chosen, here: str) -> None:
+class NextStepLine:
     """The usual one in a line, for a page that has more to show; ``here`` is its address."""
-    with suppress(Refusal):  # the page itself says what is wrong
-        step = (await _overview(service, about)).steps[0]
-        with ui.element("div").classes("next-in-a-line").props('role="note" aria-label="Next step"'):
-            ui.label("Next:")
-            ui.label(step.sentence)
-            if step.page.partition("?")[0] != here:
-                ui.link(step.label, f"/{step.page}").classes("studio-link")
+
+    def __init__(self, service: Service, about: Chosen, here: str) -> None:
+        self._service, self._about, self._here = service, about, here
+        self._line = ui.element("div").classes("next-in-a-line").props('role="note" aria-label="Next step"')
+
+    async def look(self) -> None:
+        """Again, once something was done."""
+        with suppress(Refusal):  # the page itself says what is wrong
+            step = (await _overview(self._service, self._about)).steps[0]
+            self._line.clear()
+            with self._line:
+                ui.label("Next:")
+                ui.label(step.sentence)
+                if step.page.partition("?")[0] != self._here:
+                    ui.link(step.label, f"/{step.page}").classes("studio-link")
 
 
 async def _overview(service: Service, about: Chosen | None) -> Overview:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +15,7 @@ from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.chosen import Chosen, chosen
 from glovecal_service.studio.drop import DropZone
 from glovecal_service.studio.heading import heading, quiet_act
-from glovecal_service.studio.next_steps import next_step, next_steps
+from glovecal_service.studio.next_steps import NextStepLine, next_steps
 from glovecal_service.studio.service import Refusal, Service, refusals
 from glovecal_service.studio.studio import Studio
 
@@ -84,9 +84,10 @@ async def shell(
         heading(1, title)
         if about.notice:
             ui.label(about.notice).classes("studio-notice").props('role="status"')
-        await next_step(studio.service, about, here)
+        line = NextStepLine(studio.service, about, here)
+        await line.look()
         yield Around(DropZone(studio), about)
-    drawer.start()
+    drawer.start(line.look)
 
 
 # Jobs on every page: what runs and how far it is, cancel, result; what finished meanwhile is announced.
@@ -133,10 +134,11 @@ class JobsDrawer:
             ui.link("All jobs", "/jobs").classes("studio-link")
             quiet_act("Close", self._dialog.close)
 
-    def start(self) -> None:
-        ui.timer(EVERY_S, self._look)
+    def start(self, ended: Callable[[], Awaitable[None]]) -> None:
+        """``ended`` is called after jobs have ended."""
+        ui.timer(EVERY_S, partial(self._look, ended))
 
-    async def _look(self) -> None:
+    async def _look(self, ended: Callable[[], Awaitable[None]]) -> None:
         service = self._studio.service
         try:
             running = await service.read(list[Job], "/jobs", only_unfinished=True)
@@ -150,6 +152,8 @@ class JobsDrawer:
         for job in jobs:
             if self._running is not None and job.id in self._running and job.id not in now:
                 ui.notify(f"{job.kind}: {job.state}", position="bottom-right")
+        if set(self._running or ()) - set(now):
+            await ended()
         self._running = now
         self._list.clear()
         with self._list:

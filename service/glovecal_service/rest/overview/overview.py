@@ -70,7 +70,7 @@ def _steps(
     teaching = [take for take in takes if take.teaches]
     newest = teaching[-1].created_at if teaching else None
     if models and (newest is None or any((model.created_at or newest) >= newest for model in models)):
-        return [*_of_model(store, models[-1], active), IMPORT]
+        return [*_of_model(store, models, active), IMPORT]
     if teaching:
         subject = teaching[-1].subject
         own = [take for take in teaching if take.subject == subject]
@@ -100,8 +100,19 @@ def _calibrate(glove: GloveRecord) -> NextStep:
     )
 
 
-def _of_model(store: Store, model: ModelRecord, active: set[str]) -> list[NextStep]:
+def _of_model(store: Store, models: Sequence[ModelRecord], active: set[str]) -> list[NextStep]:
+    """Of the last one."""
+    model = models[-1]
     short = model.id[:SHORT]
+    if better := _better_versions(model, models):
+        version = better[-1]
+        fall = NextStep(
+            sentence=f"Version {version.id[:SHORT]} of it errs by {_error(version):.2f} degrees, "
+            f"{short} by {_error(model):.2f}.",
+            command=f"glovecal model activate {version.id[:SHORT]}", page=f"fall?model={version.id}",
+            label="See the error fall",
+        )  # fmt: skip
+        return [fall]
     jobs = store.jobs.list(subject=model.subject, part=ListPart(text=model.id))
     diagnosed = any(
         job.kind == "diagnose" and job.state == "done" and job.payload.get("model") == model.id
@@ -118,3 +129,15 @@ def _of_model(store: Store, model: ModelRecord, active: set[str]) -> list[NextSt
         command=f"glovecal model activate {short}", page="models", label="Choose the live model",
     )  # fmt: skip
     return [diagnose] if model.id in active else [diagnose, activate]
+
+
+def _better_versions(model: ModelRecord, models: Sequence[ModelRecord]) -> list[ModelRecord]:
+    """Made of it, with a smaller held-out error; the best one last."""
+    made = [each for each in models if each.parent == model.id and _error(each) < _error(model)]
+    return sorted(made, key=_error, reverse=True)
+
+
+def _error(model: ModelRecord) -> float:
+    """Held-out, degrees; not a number where none was measured."""
+    error = model.facts.get("held_out_rmse_deg")
+    return float("nan") if error is None else float(error)
