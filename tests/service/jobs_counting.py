@@ -16,7 +16,7 @@ import scipy.linalg
 from threadpoolctl import threadpool_info
 
 from glovecal_models.errors import Cancelled, NotTrainable
-from glovecal_service.jobs.job_kind import JobPlan, Report, Step, Task, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskReport, TaskResult
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
 
@@ -31,7 +31,7 @@ class Counting:
     ending: str = "result"
 
 
-def count(work: Counting, cancelled: Callable[[], bool], report: Report) -> TaskResult:
+def count(work: Counting, cancelled: Callable[[], bool], report: TaskReport) -> TaskResult:
     note(work.ledger, f"begin {work.number} {os.getpid()}")
     until = time.monotonic() + work.seconds
     while time.monotonic() < until:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from glovecal_models.ceiling.answer import LeftToGain
 from glovecal_models.comparison.floor_estimate import NoiseFloor
@@ -228,6 +228,38 @@ class ImprovementStep:
     """In a wearing that training did not see; null: one wearing only."""
 
 
+class OnTheWay(Protocol):
+    """A step, whether it is computed or told."""
+
+    @property
+    def added(self) -> AddedInStep | None: ...
+    @property
+    def rmse_deg(self) -> float | None: ...
+    @property
+    def control_rmse_deg(self) -> float | None: ...
+
+
+def falls_of(method: str, steps: Sequence[OnTheWay]) -> list[FallStep]:
+    """The base by ``method``, and each effect. No control is above the error before: what made it worse would
+    have been undone."""
+    falls: list[FallStep] = []
+    before: float | None = None
+    for step in steps:
+        label = method if step.added is None else "+ " + step.added.effect.replace("_", "\n", 1)
+        control = step.control_rmse_deg
+        known = min(control, before) if control is not None and before else None
+        before = step.rmse_deg
+        falls.append(FallStep(label, before or 0.0, known))
+    return falls
+
+
+@answer
+class ImprovedSoFar:
+    """What a running improvement has reached."""
+
+    falls: Sequence[FallStep] = ()
+
+
 @answer
 class Improved(Answer):
     """The fall of the error from a base model through every effect that was added."""
@@ -281,19 +313,9 @@ class Improved(Answer):
         scale = sorted(
             ((name, error or 0.0) for name, error in self.baselines.items()), key=lambda one: -one[1]
         )
-        falls = [FallStep(name, error, is_scale=True) for name, error in scale]
-        for step, control in zip(self.steps, self._controls, strict=True):
-            label = self.method if step.added is None else "+ " + step.added.effect.replace("_", "\n", 1)
-            falls.append(FallStep(label, step.rmse_deg or 0.0, control))
-        return falls
-
-    @property
-    def _controls(self) -> list[float | None]:
-        """Of each step; not above the error before: what made it worse would have been undone."""
-        before = [None, *(step.rmse_deg for step in self.steps)]
         return [
-            min(step.control_rmse_deg, error) if step.control_rmse_deg is not None and error else None
-            for step, error in zip(self.steps, before, strict=False)
+            *(FallStep(name, error, is_scale=True) for name, error in scale),
+            *falls_of(self.method, self.steps),
         ]
 
     def presentation(self) -> Presentation:
@@ -381,9 +403,9 @@ class Improved(Answer):
             (
                 (step.model or "-")[:SHORT],
                 f"{self.method} alone" if step.added is None else step.added.text,
-                step.rmse_unseen_wearing_deg, step.rmse_deg, control,
+                step.rmse_unseen_wearing_deg, step.rmse_deg, fall.control_rmse_deg,
             )
-            for step, control in zip(self.steps, self._controls, strict=True)
+            for step, fall in zip(self.steps, falls_of(self.method, self.steps), strict=True)
         ]  # fmt: skip
         return Table(columns, rows)
 

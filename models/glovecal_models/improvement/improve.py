@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -55,6 +55,8 @@ from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import take_warnings
 
+Stepped = Callable[[Sequence[Step]], None]
+
 
 def improve(
     takes: Sequence[Take],
@@ -70,12 +72,13 @@ def improve(
     ceiling: bool = False,
     cancelled: Cancel | None = None,
     report: Report | None = None,
+    stepped: Stepped | None = None,
 ) -> Improvement:
     """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
 
     Takes that do not fit the others are set aside first. Errors are on ``holdout`` when given, else on
     held-out takes. ``ceiling``: see at the end whether anything is left to gain from what was recorded; needs
-    the extra ``ceiling`` of this package.
+    the extra ``ceiling`` of this package. ``stepped`` is given all steps so far after each.
     """
     settings = settings or TrainingSettings()
     odd = odd_takes(takes, layout)
@@ -84,7 +87,7 @@ def improve(
     takes, usable = fitting(takes, odd), usable_sensors(layout, fitting(takes, odd))
     loop = _Loop(
         takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
-        cancelled, report,
+        cancelled, report, stepped,
     )  # fmt: skip
     loop.start()
     while len(loop.steps) <= max_steps and loop.go_on():
@@ -108,6 +111,7 @@ class _Loop:
     limits: ImprovementLimits
     cancelled: Cancel | None
     report: Report | None
+    stepped: Stepped | None
     steps: list[Step] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)
     followed: set[tuple[str, str]] = field(default_factory=set)
@@ -355,6 +359,8 @@ class _Loop:
         control = None if added is None or share is None else self._with_control(added.where, share)
         held_out = self.errors.overall_deg
         self.steps.append(Step(model, added, overall, per_rotation, control, held_out))
+        if self.stepped:
+            self.stepped(self.steps)
 
     def _with_control(self, rotations: Sequence[str], share: float) -> float:
         """Error over all rotations where a control leaves ``share`` of that of ``rotations``."""

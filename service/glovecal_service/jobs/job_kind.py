@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from glovecal_models.progress import Cancel, Report
+from glovecal_models.progress import Cancel
 
 if TYPE_CHECKING:
     from glovecal_service.store import Store
@@ -27,6 +27,14 @@ class TaskResult:
     """JSON-able."""
 
 
+class TaskReport(Protocol):
+    """How a task says how far it is: a ``Report`` that may give more than its sentence."""
+
+    def __call__(self, sentence: str, share: float, detail: Mapping[str, Any] = ..., /) -> None:
+        """``share`` of this task, 0 to 1. ``detail``: JSON-able, becomes the job's."""
+        ...
+
+
 @dataclass(frozen=True)
 class Task:
     """One unit of work for one worker process."""
@@ -35,7 +43,7 @@ class Task:
     """Names the result: data, settings and software version hashed. A finished key is never run again."""
     label: str
     """For messages: ``I_PIP`` or ``I_PIP, fold 2``."""
-    function: Callable[[Any, Cancel, Report], TaskResult]
+    function: Callable[[Any, Cancel, TaskReport], TaskResult]
     """A function of a module (workers import it); polls the second argument and raises Cancelled. A long one
     says to the third how far it is."""
     payload: Any

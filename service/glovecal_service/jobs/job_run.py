@@ -254,13 +254,13 @@ class JobRun:
     def _tell_on(self) -> None:
         """Pass on what a running task said last, once; its file is gone before its own end is told."""
         with self._telling:
-            sentence = None
+            told = None
             for number in set(range(len(self._tasks))) - self._done:
                 said = ProgressFile(self._progress_file(number)).read()
                 if said is not None and said != self._heard.get(number):
-                    self._heard[number], sentence = said, said.sentence
-            if sentence is not None and not self._stopped.is_set():
-                self._tell(self._fraction(), sentence, {})
+                    self._heard[number] = told = said
+            if told is not None and not self._stopped.is_set():
+                self._tell(self._fraction(), told.sentence, told.detail)
 
     def _written(self, write: Callable[[], object]) -> None:
         """Repeat a write while the database is away; the lease outlives a short restart."""

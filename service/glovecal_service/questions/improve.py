@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -10,12 +10,11 @@ from pydantic import Field
 
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
-from glovecal_models.improvement.answer import Improved
+from glovecal_models.improvement.answer import Improved, ImprovedSoFar, OnTheWay, falls_of
 from glovecal_models.improvement.text import improved
 from glovecal_models.layout import Layout
-from glovecal_models.progress import Report
 from glovecal_models.takes.take import Take
-from glovecal_service.jobs.job_kind import JobPlan, Step, TaskResult
+from glovecal_service.jobs.job_kind import JobPlan, Step, TaskReport, TaskResult
 from glovecal_service.questions.chosen_takes import TakesNamed, takes_named
 from glovecal_service.questions.making import Begun, Making, keep, made, models_of, one_task
 from glovecal_service.questions.model_work import is_short, model_title
@@ -134,11 +133,19 @@ def plan(store: Store, job: JobRecord) -> JobPlan:
     )
 
 
-def run(work: ImprovementWork, cancelled: Callable[[], bool], report: Report) -> TaskResult:
+def run(work: ImprovementWork, cancelled: Callable[[], bool], report: TaskReport) -> TaskResult:
     """In a worker. Raises BadInput, NotTrainable, Cancelled."""
     from glovecal_models.improvement.improve import improve  # heavy, and many commands run no job
 
-    asked = work.asked
+    asked, so_far = work.asked, ImprovedSoFar()
+
+    def stepped(steps: Sequence[OnTheWay]) -> None:
+        nonlocal so_far
+        so_far = ImprovedSoFar(falls_of(asked.method, steps))
+
+    def say(sentence: str, share: float) -> None:
+        report(sentence, share, asdict(so_far))
+
     found = improve(
         work.takes,
         work.layout,
@@ -150,7 +157,8 @@ def run(work: ImprovementWork, cancelled: Callable[[], bool], report: Report) ->
         take_hashes=work.take_hashes,
         ceiling=asked.ceiling,
         cancelled=cancelled,
-        report=report,
+        report=say,
+        stepped=stepped,
     )
     return made(improved(found), found.models)
 

@@ -17,9 +17,16 @@ EVERY_S = 0.5
 class JobWatch:
     """One bar on a page, hidden while no job is followed. A page that is closed leaves its job running."""
 
-    def __init__(self, studio: Studio, finished: Callable[[Job], Awaitable[None]]) -> None:
+    def __init__(
+        self,
+        studio: Studio,
+        finished: Callable[[Job], Awaitable[None]],
+        looked: Callable[[Job], None] | None = None,
+    ) -> None:
+        """``looked`` is given the job twice a second while it runs."""
         self._studio = studio
         self._finished = finished
+        self._looked = looked
         self._job = ""
         self._row = ui.element("section").classes("job").props('aria-label="Running job"')
         with self._row:
@@ -45,6 +52,8 @@ class JobWatch:
         self._bar.set_value(job.fraction)
         self._sentence.set_text(f"{100 * job.fraction:.0f} %  {job.sentence}")
         if job.finished_at is None:
+            if self._looked is not None:
+                self._looked(job)
             return
         self._end("" if job.state == "done" else job.error or f"{job.kind}: {job.state}")
         await self._finished(job)

@@ -12,6 +12,8 @@ from glovecal_models.calibration.training_settings import TrainingSettings, requ
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.improvement.add_effect import add_effect
+from glovecal_models.improvement.answer import falls_of
+from glovecal_models.improvement.fall.answer import FallStep
 from glovecal_models.improvement.improve import improve
 from glovecal_models.improvement.remove_effect import remove_effect
 from glovecal_models.improvement.text import addition_sentence, improvement_sentences
@@ -124,7 +126,13 @@ def test_clocks_are_estimated_again_on_other_takes(sticky):
 
 def test_the_loop_adds_the_effect_that_was_simulated(sticky):
     takes, holdout = sticky.takes[:6], sticky.takes[6:]
-    found = improve(takes, LAYOUT, "anna", SETTINGS, holdout=holdout, max_steps=2)
+    told: list[list[FallStep]] = []
+    found = improve(
+        takes, LAYOUT, "anna", SETTINGS, holdout=holdout, max_steps=2,
+        stepped=lambda steps: told.append(falls_of(SETTINGS.method, steps)),
+    )  # fmt: skip
+    assert [len(falls) for falls in told] == [*range(1, len(found.steps) + 1)]
+    assert [fall.rmse_deg for fall in told[-1]] == [step.rmse_deg for step in found.steps]
     first, second = found.steps[:2]
     assert first.added is None
     assert second.added is not None

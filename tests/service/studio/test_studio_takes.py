@@ -84,6 +84,30 @@ def test_a_foreign_table_becomes_a_model_and_its_effect(
     assert seen.complaints == []
 
 
+def test_improving_shows_the_error_fall_step_by_step(
+    opened: Open, client: RestClient, tmp_path: Path
+) -> None:
+    seen = opened("takes")
+    page = seen.page
+    drop(page, semicolons(tmp_path, 6, seconds=20.0))
+    page.get_by_label("Whose takes").fill("ida")
+    page.get_by_role("button", name="Import 6 takes").click()
+    page.get_by_text("Linear: ").click()
+    page.get_by_role("button", name="Improve").click()
+    chart = page.get_by_role("img", name="Held-out error of each step so far")
+    expect(chart).to_be_visible(timeout=JOB_PATIENCE_MS)
+    expect(page.get_by_text("being made")).to_be_visible(timeout=JOB_PATIENCE_MS)
+    follow = page.get_by_role("button", name="See the error fall")
+    expect(follow).to_be_visible(timeout=JOB_PATIENCE_MS)
+    expect(chart).to_be_visible()
+    expect(page.get_by_text("being made")).to_be_hidden()
+    assert NAMED in client.get("/models", {"subject": "ida"})[1]["effects"]
+    assert serious(page) == []
+    follow.click()
+    expect(page.get_by_text("The error falls from").first).to_contain_text(NAMED)
+    assert seen.complaints == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("write", [semicolons, laboratory])
 def test_twelve_takes_whose_columns_name_their_joints(

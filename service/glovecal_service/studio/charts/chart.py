@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -13,6 +13,7 @@ from nicegui.elements.echart import echart as _echart  # noqa: F401
 from nicegui.events import GenericEventArguments
 
 from glovecal_models.comparison.series.answer import ResidualColumn, Series
+from glovecal_models.improvement.fall.answer import FallStep, FloorBand
 from glovecal_models.takes.answer import TakeSeries
 from glovecal_service.plain import document_of
 from glovecal_service.rest.effect.answer import EffectPictureView
@@ -63,9 +64,10 @@ class FallChart(Chart, component="fall_chart.js"):
         super().__init__(label=label)
         self._props.update(pending=None)
 
-    def show(self, fall: Mapping[str, Any]) -> None:
-        """An answer of ``GET /v1/models/{id}/fall``."""
-        self._draw(dict(fall))
+    def show(self, steps: Sequence[FallStep], floor: FloorBand | None) -> None:
+        """Bars from left to right, and the noise floor where it is known."""
+        drawn = [{**vars(step), "label": " ".join(step.label.split())} for step in steps]
+        self._draw({"steps": drawn, "floor": floor and dict(vars(floor))})
 
     def grow(self, label: str, fraction: float) -> None:
         """The place of the next version, and how far the job is that makes it, 0 to 1."""

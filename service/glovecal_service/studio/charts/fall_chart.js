@@ -23,7 +23,7 @@ export default {
         {
           type: "bar", stack: "error", name: "held-out error", barMaxWidth: 84, z: 2, cursor: "default",
           data: [
-            ...steps.map((one) => ({ value: one.rmse_deg, itemStyle: { color: one.model === null ? grey : blue } })),
+            ...steps.map((one) => ({ value: one.rmse_deg, itemStyle: { color: one.is_scale ? grey : blue } })),
             ...(next ? [{ value: last, itemStyle: { color: "transparent", borderColor: blue, borderType: "dashed", borderWidth: 2 } }] : []),
           ],
           label: {

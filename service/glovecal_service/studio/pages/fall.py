@@ -69,12 +69,12 @@ class FallPage:
         self._shown.clear()
         self._chart = None
         try:
-            fall = await self._service.get(f"/models/{self._model}/fall")
+            found = await self._service.read(ErrorFall, f"/models/{self._model}/fall")
         except Refusal as refusal:
             with self._shown:
                 ui.label(str(refusal)).classes("finding-sentence")
             return
-        found, undone = read(ErrorFall, fall), await self._undone()
+        undone = await self._undone()
         with self._shown:
             ui.label(found.sentence).classes("finding-sentence")
             with ui.element("section").classes("finding"):
@@ -82,7 +82,7 @@ class FallPage:
                 self._chart = FallChart(label=f"Held-out error of each step. {found.sentence}").classes(
                     "fall"
                 )
-                self._chart.show(fall)
+                self._chart.show(found.steps, found.floor)
                 ui.label(f"Root mean square over all rotations. {found.how}").classes("fall-how")
                 with ui.element("div").classes("page-acts"):
                     self._acts(line)

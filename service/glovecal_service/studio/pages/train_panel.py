@@ -9,12 +9,13 @@ from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
 from glovecal_models.calibration.answer import Trained
-from glovecal_models.improvement.answer import STOPPED, Improved
+from glovecal_models.improvement.answer import STOPPED, Improved, ImprovedSoFar
 from glovecal_models.presentation.document import counted
 from glovecal_service.plain import read
 from glovecal_service.rest.job.answer import Job, JobFacts
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.amounts import degrees
+from glovecal_service.studio.charts.chart import FallChart
 from glovecal_service.studio.chosen import MOST_OFFERED
 from glovecal_service.studio.heading import act, goes_live, heading, main_act
 from glovecal_service.studio.job_watch import JobWatch
@@ -82,7 +83,9 @@ class TrainPanel:
             with ui.row().classes("choices"):
                 main_act(f"Train on {counted(len(chosen), 'take')}", self._train)
                 act("Improve: add what is missing, step by step", self._improve)
-            self._watch = JobWatch(self._studio, self._finished)
+            self._watch = JobWatch(self._studio, self._finished, self._grow)
+            self._fall = FallChart(label="Held-out error of each step so far").classes("fall")
+            self._fall.set_visibility(False)
             self._result = ui.element("div").props('aria-live="polite"')
 
     def _count(self, event: ValueChangeEventArguments) -> None:
@@ -103,7 +106,16 @@ class TrainPanel:
             job = await self._studio.service.ask(JobFacts, path, body)
             self._watch.follow(job.id)
 
+    def _grow(self, job: Job) -> None:
+        """The steps of an improvement so far, and the place of the next."""
+        falls = read(ImprovedSoFar, job.detail).falls if job.kind == "improve" else ()
+        self._fall.set_visibility(bool(falls))
+        if falls:
+            self._fall.show(falls, None)
+            self._fall.grow("next effect", job.fraction)
+
     async def _finished(self, job: Job) -> None:
+        self._fall.set_visibility(False)
         if job.state != "done":
             return
         self._result.clear()
@@ -114,6 +126,9 @@ class TrainPanel:
                     f"{' '.join(step.label.split())} {degrees(step.rmse_deg)}" for step in improved.falls
                 )
                 ui.label(f"{fall}. {STOPPED[improved.stopped]}").classes("finding-sentence")
+                self._fall.set_visibility(True)
+                self._fall.stand()
+                self._fall.show(improved.falls, improved.band)
                 for tried in improved.undone:
                     ui.label(tried.sentence)
                 main_act("See the error fall", lambda: ui.navigate.to(f"/fall?model={improved.last.model}"))
