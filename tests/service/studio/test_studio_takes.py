@@ -80,6 +80,8 @@ def test_a_foreign_table_becomes_a_model_and_its_effect(
     *_, before, after = client.get("/models", {"subject": "dora"})
     assert after["effects"] == [NAMED]
     assert after["held_out_rmse_deg"] < 0.8 * before["held_out_rmse_deg"]
+    page = opened("takes?who=dora").page
+    expect(page.get_by_text("Gaussian process for the rest. Last time: ")).to_contain_text(" s, 6 takes.")
     assert not before["active"], "nothing is activated unasked"
     assert seen.complaints == []
 
@@ -89,7 +91,7 @@ def test_improving_shows_the_error_fall_step_by_step(
 ) -> None:
     seen = opened("takes")
     page = seen.page
-    drop(page, semicolons(tmp_path, 6, seconds=20.0))
+    drop(page, semicolons(tmp_path, 6, seconds=21.0))
     page.get_by_label("Whose takes").fill("ida")
     page.get_by_role("button", name="Import 6 takes").click()
     page.get_by_text("Linear: ").click()

@@ -30,6 +30,8 @@ METHODS = {
     "spgp": "Sparse Gaussian process on pseudo-inputs: for very many frames.",
 }
 MOST_LINKED = 12
+MOST_LOOKED_AT = 20
+"""Earlier trainings, the newest ones."""
 
 
 class TrainPanel:
@@ -78,7 +80,9 @@ class TrainPanel:
                 ui.label("Look at a take first:")
                 for take in teaching[:MOST_LINKED]:
                     ui.link(take.name, f"/take?id={take.id}").classes("studio-link")
-            self._method = ui.radio(METHODS, value="lmc_gpr")
+            took = await self._took()
+            methods = {name: f"{what}{took.get(name, '')}" for name, what in METHODS.items()}
+            self._method = ui.radio(methods, value="lmc_gpr")
             self._live = goes_live()
             with ui.row().classes("choices"):
                 main_act(f"Train on {counted(len(chosen), 'take')}", self._train)
@@ -87,6 +91,17 @@ class TrainPanel:
             self._fall = FallChart(label="Held-out error of each step so far").classes("fall")
             self._fall.set_visibility(False)
             self._result = ui.element("div").props('aria-live="polite"')
+
+    async def _took(self) -> dict[str, str]:
+        """By method: how long its last training took on this computer, and of how much."""
+        jobs = await self._studio.service.read(list[Job], "/jobs", text="train", limit=MOST_LOOKED_AT)
+        took: dict[str, str] = {}
+        for job in jobs:
+            if job.kind == "train" and job.state == "done" and job.took_s is not None:
+                took.setdefault(
+                    str(job.payload.get("method")), f" Last time: {job.took_s:.0f} s, {job.about}."
+                )
+        return took
 
     def _count(self, event: ValueChangeEventArguments) -> None:
         self._takes.props["display-value"] = counted(len(event.value), "take")
