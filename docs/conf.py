@@ -43,6 +43,7 @@ html_css_files = ["site.css"]
 html_copy_source = False
 html_show_copyright = False
 html_use_index = False
+html_show_search_summary = False  # a page opened as a file may not read others: the search names them
 
 STUDY = ["The blind study <docs/study>"] if (HERE / "study.md").exists() else []
 TRIED = ("What was tried <docs/study-tried>", "What each rule is worth <docs/ablation>")

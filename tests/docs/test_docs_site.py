@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ from typing import NoReturn
 
 import pytest
 import typer.main
+from playwright.sync_api import expect, sync_playwright
 
 from glovecal_service.cli.command import app
 from glovecal_service.rest.app import create_app
@@ -72,6 +74,26 @@ def test_the_folder_opens_on_the_front_page(site: Path) -> None:
     leads = (site / "index.html").read_text()
     (target,) = re.findall(r"url=([\w.]+)", leads)
     assert (site / target).exists()
+
+
+@pytest.mark.needs_chromium
+def test_the_search_works_on_pages_opened_as_files(site: Path, not_here: Callable[[str], NoReturn]) -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        not_here("Chromium is not installed (Debian: apt-get install chromium)")
+    complaints: list[str] = []
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=chromium, args=["--headless", "--no-sandbox"])
+        page = browser.new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto((site / "docs" / "effects.html").as_uri())
+        page.get_by_role("textbox", name="Search").fill("hysteresis")
+        page.get_by_role("textbox", name="Search").press("Enter")
+        expect(page.get_by_text(re.compile("found [0-9]+ pages"))).to_be_visible(timeout=120_000)
+        expect(page.get_by_role("link", name="The blind study").last).to_be_visible()
+        browser.close()
+    assert complaints == []
 
 
 def test_every_command_has_its_entry(site: Path) -> None:
