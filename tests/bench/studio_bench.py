@@ -47,7 +47,7 @@ UPDATES = """() => [...document.querySelectorAll(".hand-view")]
     .map(view => getElement(view.id.slice(1)).drawn().updates)"""
 TARGETS = (
     ("updates_hz", ">=", 25.0, "updates of a live hand a second"),
-    ("page_core_percent", "<=", 15.0, "% of one core of the service for an open page"),
+    ("page_core_percent", "<=", 8.0, "% of one core of the service for an open page"),
     ("age_effect_ms", "<=", 2.0, f"ms more at the 99th percentile of poses' age with {PAGES} pages open"),
     ("growth_mb", "<=", 20.0, "MB growth of a page with two gloves"),
     ("first_s", "<=", 2.0, "s until a page shows its hands"),

@@ -66,13 +66,42 @@ def test_no_other_name_reaches_a_path(name):
         def exists(self, name: str) -> bool:
             pytest.fail(f"a path was made of {name!r}")
 
+        def stamp(self, name: str) -> None:
+            pytest.fail(f"a path was made of {name!r}")
+
         def write(self, name: str, content: bytes) -> None:
             pytest.fail(f"a path was made of {name!r}")
 
     artifacts = Artifacts(Untouched())
-    for call in (artifacts.get, artifacts.exists):
+    for call in (artifacts.get, artifacts.exists, artifacts.verify):
         with pytest.raises(BadInput):
             call(name)
+
+
+def test_what_was_verified_is_read_again_only_when_it_changed(tmp_path):
+    class Counting(FolderBlobs):
+        reads = 0
+
+        def read(self, name: str) -> bytes | None:
+            self.reads += 1
+            return super().read(name)
+
+    blobs = Counting(tmp_path)
+    artifacts = Artifacts(blobs)
+    name = artifacts.put(b"some model")
+    blobs.reads = 0
+    for _ in range(5):
+        artifacts.verify(name)
+    assert blobs.reads == 1
+    (tmp_path / name).write_bytes(b"SOME model")
+    for _ in range(2):
+        with pytest.raises(DamagedArtifact, match=name):
+            artifacts.verify(name)
+    (tmp_path / name).unlink()
+    with pytest.raises(NotFound, match=name):
+        artifacts.verify(name)
+    artifacts.put(b"some model")
+    artifacts.verify(name)
 
 
 def test_nothing_but_whole_artifacts_is_left_in_the_folder(tmp_path):

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import math
 import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
@@ -27,6 +28,8 @@ from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailabl
 TEMPORARY = ".writing-"
 ABANDONED_AFTER_S = 600.0
 """A temporary file this old belongs to a process that was killed."""
+READ_AGAIN_AFTER_S = 600.0
+"""A disk may spoil what nobody wrote."""
 LEAST_FREE_BYTES = 50_000_000
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -48,6 +51,10 @@ class Blobs(Protocol):
         ...
 
     def exists(self, name: str) -> bool: ...
+
+    def stamp(self, name: str) -> Hashable | None:
+        """Another one once the content was changed; None if there is none."""
+        ...
 
 
 class FolderBlobs:
@@ -74,6 +81,13 @@ class FolderBlobs:
 
     def exists(self, name: str) -> bool:
         return (self._folder / name).is_file()
+
+    def stamp(self, name: str) -> Hashable | None:
+        try:
+            found = (self._folder / name).stat()
+        except FileNotFoundError:
+            return None
+        return found.st_size, found.st_mtime_ns, found.st_ino
 
     def _sweep(self) -> None:
         for leftover in self._folder.glob(f"{TEMPORARY}*"):
@@ -116,6 +130,14 @@ class ObjectBlobs:
             except (FileNotFoundError, obstore.exceptions.NotFoundError):
                 return False
             return True
+
+    def stamp(self, name: str) -> Hashable | None:
+        with self._answering():
+            try:
+                found = obstore.head(self._store, name)
+            except (FileNotFoundError, obstore.exceptions.NotFoundError):
+                return None
+            return found["size"], found["last_modified"], found["e_tag"]
 
     @contextmanager
     def _answering(self) -> Iterator[None]:
@@ -174,6 +196,8 @@ class Artifacts:
 
     def __init__(self, blobs: Blobs) -> None:
         self._blobs = blobs
+        self._verified: dict[str, tuple[Hashable, float]] = {}
+        """Stamp and moment of what was read and found sound."""
 
     def put(self, content: bytes) -> str:
         """Keep ``content`` and return its sha256; once this returns it survives a power cut.
@@ -199,6 +223,15 @@ class Artifacts:
                 f" sha256 {found}; restore that file from a backup"
             )
         return content
+
+    def verify(self, sha256: str) -> None:
+        """As ``get``, without reading again what was sound some minutes ago and is not changed since."""
+        stamp, now = self._blobs.stamp(check_sha256(sha256)), time.monotonic()
+        before, at = self._verified.get(sha256, (None, -math.inf))
+        if stamp is None or stamp != before or now - at > READ_AGAIN_AFTER_S:
+            self._verified.pop(sha256, None)
+            self.get(sha256)
+            self._verified[sha256] = stamp, now
 
     def is_sound(self, sha256: str) -> bool:
         """Whether there is a file of that name that holds what was put there."""

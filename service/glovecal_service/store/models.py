@@ -209,7 +209,7 @@ class Models:
     def damage(self, model: ModelRecord) -> str:
         """Why the model's artifact cannot be loaded, and what to do; "" while it is what was stored."""
         try:
-            self._artifacts.get(model.id)
+            self._artifacts.verify(model.id)
         except (DamagedArtifact, NotFound) as error:
             with self._database.read() as connection:
                 current = _current(connection, model.subject, model.layout, model.hand)

@@ -78,6 +78,7 @@ def server_config(app: Any, host: str, port: int) -> uvicorn.Config:
         server_header=False,
         date_header=True,
         proxy_headers=False,
+        ws_per_message_deflate=False,  # a live hand's floats hardly get shorter, thirty times a second
         timeout_keep_alive=15,
         timeout_graceful_shutdown=3,
         lifespan="on",
