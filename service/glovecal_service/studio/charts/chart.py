@@ -55,6 +55,26 @@ class TakeChart(Chart, component="take_chart.js"):
         """One take, or two over each other."""
         self._draw({"takes": [asdict(take) for take in takes], "spectra": spectra})
 
+    def choose(self, from_s: float | None, to_s: float | None) -> None:
+        """Mark a stretch as it would be left out; none where an end is missing."""
+        self.run_method("choose", from_s, to_s)
+
+    def on_moment(self, chosen: Callable[[float], Any]) -> None:
+        """Call with the seconds since the first frame where it was clicked."""
+
+        def told(event: GenericEventArguments) -> Any:
+            return chosen(float(event.args))
+
+        self.on("moment", told)
+
+    def on_stretch(self, chosen: Callable[[float, float], Any]) -> None:
+        """Call with the two ends between which a mouse was drawn over it."""
+
+        def told(event: GenericEventArguments) -> Any:
+            return chosen(*map(float, event.args))
+
+        self.on("stretch", told)
+
 
 class FallChart(Chart, component="fall_chart.js"):
     """One bar a step, with its control's line and the band of the noise floor."""
