@@ -12,10 +12,12 @@ from nicegui import ui
 from glovecal_models.diagnosis.answer import MissingEffects
 from glovecal_models.improvement.answer import Improved
 from glovecal_service.rest.glove.answer import Film, GloveView, Recording
+from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
 from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
 from glovecal_service.studio.pages.take_reference import TakeReference
+from glovecal_service.studio.pages.take_view import TakeView
 from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 
@@ -186,6 +188,8 @@ class RecordingPage:
                 await self._tell_video(account.take)
             if account.take:
                 ui.label(f"Take {account.take}.").classes("version-id")
+                own = await self._studio.service.read(Take, f"/takes/{account.take}")
+                await TakeView(self._studio, own).build()
                 await self._reference.choose(account.take)
 
     async def _film_line(self) -> str:
