@@ -44,8 +44,8 @@ def get_series(
 ) -> JSONResponse:
     """Of many frames those that hold each sensor's lowest and highest reading: no extreme is lost."""
     take, left_out = store.takes.load_recorded(id), store.takes.get(id).left_out
-    found = take_series(take, from_s=from_s, to_s=to_s, points=points)
-    return JSONResponse(document_of(replace(found, left_out=left_out)))
+    answer = take_series(take, from_s=from_s, to_s=to_s, points=points)
+    return JSONResponse(document_of(replace(answer, left_out=left_out)))
 
 
 PART_S = 30.0
@@ -85,18 +85,20 @@ def get_hand(
     inside = np.flatnonzero((time >= from_s) & (time < from_s + PART_S))
     frames = inside[:: max(1, math.ceil(rate_hz / SHOWN_HZ))]
     spans = list(zip(take.readings.min(axis=0).tolist(), take.readings.max(axis=0).tolist(), strict=True))
-    found = HandOverTime(
+    answer = HandOverTime(
         source="raw", model=None, from_s=from_s, to_s=min(from_s + PART_S, take.duration_s),
         names=list(take.sensors), time_s=np.round(time[frames], 4).tolist(),
         values=take.readings[frames].tolist(), spans=spans, sentence=RAW,
     )  # fmt: skip
     if record.has_reference:
         angles = take.reference_at_frames(record.rotations)[frames]
-        said = f"Measured: {counted(len(record.rotations), 'rotation')}; all others rest."
-        found = found.model_copy(update={"source": "reference", **_angles(record.rotations, angles, said)})
+        sentence = f"Measured: {counted(len(record.rotations), 'rotation')}; all others rest."
+        answer = answer.model_copy(
+            update={"source": "reference", **_angles(record.rotations, angles, sentence)}
+        )
     elif model is not None:
-        found = found.model_copy(update={"source": "model", **_posed(parts, record, take, frames, model)})
-    return JSONResponse(document_of(found))
+        answer = answer.model_copy(update={"source": "model", **_posed(parts, record, take, frames, model)})
+    return JSONResponse(document_of(answer))
 
 
 def _posed(parts: Parts, record: TakeRecord, take: Take, frames: np.ndarray, model: str) -> dict[str, Any]:
@@ -107,9 +109,9 @@ def _posed(parts: Parts, record: TakeRecord, take: Take, frames: np.ndarray, mod
     part = replace(take.some(wanted, np.zeros(len(take.reference_time_s), bool)), begins_s=None)
     skeleton = parts.store.subjects.get(record.subject).skeleton(record.known_hand)
     motion = motion_of(part, parts.predictors.get(id)[0], skeleton, "hand")
-    said = f"Nothing was measured: the poses of {model_title(parts.store, id)}."
+    sentence = f"Nothing was measured: the poses of {model_title(parts.store, id)}."
     angles = motion.degrees[np.searchsorted(motion.time_s, at)]
-    return {"model": id, **_angles(motion.rotations, angles, said)}
+    return {"model": id, **_angles(motion.rotations, angles, sentence)}
 
 
 def _angles(rotations: Sequence[str], angles: np.ndarray, sentence: str) -> dict[str, Any]:

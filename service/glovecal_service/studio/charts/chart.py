@@ -62,18 +62,12 @@ class TakeChart(Chart, component="take_chart.js"):
     def on_moment(self, chosen: Callable[[float], Any]) -> None:
         """Call with the seconds since the first frame where it was clicked."""
 
-        def told(event: GenericEventArguments) -> Any:
-            return chosen(float(event.args))
-
-        self.on("moment", told)
+        self.on("moment", lambda event: chosen(float(event.args)))
 
     def on_stretch(self, chosen: Callable[[float, float], Any]) -> None:
         """Call with the two ends between which a mouse was drawn over it."""
 
-        def told(event: GenericEventArguments) -> Any:
-            return chosen(*map(float, event.args))
-
-        self.on("stretch", told)
+        self.on("stretch", lambda event: chosen(*map(float, event.args)))
 
 
 class FallChart(Chart, component="fall_chart.js"):

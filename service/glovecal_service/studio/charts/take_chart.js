@@ -3,7 +3,7 @@
 // spectra. A cursor goes with the replay; a click sets it, and a mouse that is drawn over the curves marks a stretch.
 import { axis, chart, colours, tooltip } from "glovecal-charts";
 
-const BAND = 92, BELOW = 22, TOP = 34, BOTTOM = 64, LEFT = 96, RIGHT = 18;
+const BAND = 92, BELOW = 22, TOP = 34, BOTTOM = 64, LEFT = 108, RIGHT = 18;
 const DRAWN_PX = 5; // less is a click
 
 export default {
@@ -100,8 +100,8 @@ export default {
           name: at === bands.length - 1 ? unit : "", nameLocation: "end",
         })),
         yAxis: bands.map((band, at) => axis(shades, {
-          gridIndex: at, type: given.spectra ? "log" : "value", scale: true, name: band.name, nameLocation: "middle", nameGap: 44, nameRotate: 0, splitNumber: 2,
-          nameTextStyle: { color: shades.ink, lineHeight: 15, align: "right" },
+          gridIndex: at, type: given.spectra ? "log" : "value", scale: true, name: band.name, nameLocation: "middle", nameGap: 40, nameRotate: 0, splitNumber: 2,
+          nameTextStyle: { color: shades.ink, fontSize: 11, lineHeight: 15, align: "right" },
           axisLabel: { color: shades.ink, hideOverlap: true, formatter: value => `${+value.toPrecision(4)}` },
         })),
         series: bands.flatMap((band, at) => band.lines.map(line => ({

@@ -124,10 +124,7 @@ class TakeReplay(Element, component="take_replay.js"):
     def on_edge(self, chosen: Callable[[Literal["from", "to"], float], Any]) -> None:
         """Call with the moment at which a stretch is to begin, or to end."""
 
-        def told(event: GenericEventArguments) -> Any:
-            return chosen(event.args["edge"], float(event.args["at_s"]))
-
-        self.on("edge", told)
+        self.on("edge", lambda event: chosen(event.args["edge"], float(event.args["at_s"])))
 
 
 class VideoBeside(Element, component="video_beside.js"):

@@ -25,17 +25,17 @@ class RawHand:
     async def of(cls, service: Service, layout: str | None) -> RawHand:
         """Without a layout each rotation is read from the sensor of its name."""
         try:
-            found = await service.read(LayoutView, f"/gloves/{quote(layout or '')}") if layout else None
+            known = await service.read(LayoutView, f"/gloves/{quote(layout or '')}") if layout else None
         except Refusal:
-            found = None
-        if found is None:
+            known = None
+        if known is None:
             return cls({}, LEAST_COUNTS)
         reads = {
             rotation: rotation if rotation in sensors else sensors[0]
-            for rotation, sensors in found.read_from.items()
+            for rotation, sensors in known.read_from.items()
             if sensors
         }
-        counts = found.document.get("counts")
+        counts = known.document.get("counts")
         return cls(reads, LEAST_SHARE * (counts[1] - counts[0]) if counts else LEAST_COUNTS)
 
     def show(self, view: HandView, shown: bool) -> None:

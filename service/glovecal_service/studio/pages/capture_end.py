@@ -17,8 +17,8 @@ from glovecal_service.rest.sampling.answer import SamplingView
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.heading import act, heading, main_act
 from glovecal_service.studio.job_watch import JobWatch
-from glovecal_service.studio.served_label import ServedLabel
 from glovecal_service.studio.pages.take_view import TakeView
+from glovecal_service.studio.served_label import ServedLabel
 from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 

@@ -10,7 +10,6 @@ from nicegui import ui
 
 from glovecal_models.presentation.document import counted
 from glovecal_models.takes.answer import TakeSeries
-from glovecal_models.takes.take import Stretch
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.rest.take.answer import CheckView, Take
 from glovecal_service.studio.charts.chart import TakeChart
@@ -46,11 +45,11 @@ class TakeView:
         self._studio = studio
         self._own = own
         self._model = model
-        self._beside = ""
+        self._over = ""
 
-    async def build(self, beside: str = "") -> None:
-        """``beside``: the id of another take that is drawn over it."""
-        own, self._beside = self._own, beside
+    async def build(self, over: str = "") -> None:
+        """``over``: the id of another take that is drawn over it."""
+        own, self._over = self._own, over
         model, service = await self._posing(), self._studio.service
         hand = f"/subjects/{quote(own.subject)}/skeleton"
         skeleton = await service.get(hand, hand=own.known_hand)
@@ -79,9 +78,9 @@ class TakeView:
         self._chart.on_stretch(self._drawn)
         await self._look()
 
-    async def show_over(self, beside: str) -> None:
+    async def show_over(self, over: str) -> None:
         """Another take over it; "" for none."""
-        self._beside = beside
+        self._over = over
         await self._draw()
 
     async def _posing(self) -> str | None:
@@ -89,8 +88,8 @@ class TakeView:
         if self._fits(self._model):
             return self._model and self._model.id
         query = {"subject": own.subject, "layout": own.layout, "hand": own.known_hand}
-        found = await self._studio.service.read(list[Model], "/models", **query)
-        return next((each.id for each in found if each.active), None)
+        models = await self._studio.service.read(list[Model], "/models", **query)
+        return next((each.id for each in models if each.active), None)
 
     def _fits(self, model: Model | None) -> bool:
         own = self._own
@@ -130,8 +129,8 @@ class TakeView:
                 end.set_value(None)
             await self._look()
 
-    async def _use_again(self, stretch: Stretch) -> None:
-        body = {"stretch": {"from_s": stretch[0], "to_s": stretch[1]}}
+    async def _use_again(self, from_s: float, to_s: float) -> None:
+        body = {"stretch": {"from_s": from_s, "to_s": to_s}}
         with refusals():
             self._own = await self._studio.service.ask(Take, f"/takes/{self._own.id}/left-out/undo", body)
             await self._look()
@@ -139,12 +138,11 @@ class TakeView:
     async def _look(self) -> None:
         self._marks.clear()
         with self._marks:
-            for stretch in self._own.left_out:
+            for low, high in self._own.left_out:
                 with ui.element("div").classes("take-mark"):
-                    ui.label(f"Left out: {stretch[0]:.2f} to {stretch[1]:.2f} s")
-                    act("Undo", partial(self._use_again, stretch)).props["aria-label"] = (
-                        f"Undo: use {stretch[0]:.2f} to {stretch[1]:.2f} s again"
-                    )
+                    ui.label(f"Left out: {low:.2f} to {high:.2f} s")
+                    undo = act("Undo", partial(self._use_again, low, high))
+                    undo.props["aria-label"] = f"Undo: use {low:.2f} to {high:.2f} s again"
         await self._check()
         await self._draw()
 
@@ -152,8 +150,8 @@ class TakeView:
         own = self._own
         rate_hz, gaps, sentences = None, 0, []
         with refusals(sentences.append):
-            found = await self._studio.service.read(CheckView, f"/takes/{own.id}/check")
-            rate_hz, gaps, sentences = found.rate_hz, found.gaps, found.sentences
+            check = await self._studio.service.read(CheckView, f"/takes/{own.id}/check")
+            rate_hz, gaps, sentences = check.rate_hz, check.gaps, check.sentences
         rate = "" if rate_hz is None else f" at {rate_hz:.1f} Hz"
         measured = counted(len(own.rotations), "rotation") if own.rotations else "nothing"
         self._told.clear()
@@ -169,7 +167,7 @@ class TakeView:
 
     async def _draw(self) -> None:
         service = self._studio.service
-        ids = [self._own.id, *filter(None, [self._beside])]
+        ids = [self._own.id, *filter(None, [self._over])]
         with refusals():
             shown = [await service.read(TakeSeries, f"/takes/{each}/series", points=POINTS) for each in ids]
             self._chart.show(shown, spectra=self._view.value == "spectra")
