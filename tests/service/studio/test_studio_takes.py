@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from foreign_tables import laboratory, logger, semicolons
-from playwright.sync_api import Page, expect
-from studio_support import Open, serious
+from playwright.sync_api import Browser, Page, expect
+from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
 
@@ -309,3 +309,29 @@ def test_the_raw_hand_moves_where_nothing_was_measured(
     assert tips[0] == pytest.approx(tips[2], abs=1.0)
     assert len([url for url in seen.asked if "/hand?" in url]) == 2
     assert seen.complaints == []
+
+
+def test_a_stretch_is_left_out_by_touch_on_a_phone(
+    browser: Browser, address: str, client: RestClient
+) -> None:
+    take = client.get("/takes")[2]
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{address}/studio/take?id={take['id']}")
+    page.get_by_text(f"Measured: {len(take['rotations'])} rotations; all others rest.").wait_for()
+    plot = page.locator(".take-plot")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + 60)
+    at = page.get_by_role("slider", name="Moment of the take")
+    expect(at).not_to_have_attribute("aria-valuetext", re.compile(r"^0\.00 of"))
+    page.get_by_role("button", name="To here").tap()
+    stand_at(page, 1.5)
+    page.get_by_role("button", name="From here").tap()
+    expect(page.get_by_label("From, s")).to_have_value("1.5")
+    page.get_by_role("button", name="Leave out", exact=True).tap()
+    page.get_by_role("button", name="again").tap()
+    expect(page.get_by_role("button", name="again")).to_have_count(0)
+    assert client.get(f"/takes/{take['id']}")["left_out"] == []
+    context.close()

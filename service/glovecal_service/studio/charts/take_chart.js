@@ -3,7 +3,7 @@
 // spectra. A cursor goes with the replay; a click sets it, and a mouse that is drawn over the curves marks a stretch.
 import { axis, chart, colours, tooltip } from "glovecal-charts";
 
-const BAND = 92, BELOW = 22, TOP = 34, BOTTOM = 64, LEFT = 108, RIGHT = 18;
+const BAND = 92, BELOW = 22, TOP = 34, BOTTOM = 64, LEFT = 108, RIGHT = 26;
 const DRAWN_PX = 5; // less is a click
 
 export default {

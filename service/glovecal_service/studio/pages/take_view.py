@@ -24,7 +24,7 @@ VIEWS = {"time": "Over time", "spectra": "Spectra of the readings"}
 KEYS = (
     "Readings are in counts, the reference in degrees, time in seconds since the first frame. A click goes "
     "there, a mouse drawn over the curves marks a stretch. Drag below the curves to zoom, or turn the wheel "
-    "with Ctrl. Grey: recorded before the take was asked for. Amber: frames are missing. Dark: left out. "
+    "with Ctrl. Grey: recorded before the take was asked for; stronger: left out. Amber: frames are missing. "
     "Over an angle: the reference jumps while the sensors do not."
 )
 STYLES = ("findings", "compare")
