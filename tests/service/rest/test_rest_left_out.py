@@ -12,6 +12,7 @@ import pytest
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
+from glovecal_service.questions.model_work import ModelWork
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 
@@ -91,6 +92,23 @@ def test_training_sees_the_rest_and_says_so(client: RestClient, takes: list[dict
     assert error(client, clean, id) < 0.2
     client.post(f"/takes/{id}/left-out/undo", {})
     assert error(client, clean, id) > 5.0
+
+
+def test_a_job_on_a_take_with_another_stretch_left_out_is_another_job(
+    client: RestClient, takes: list[dict[str, Any]], stored: Store
+) -> None:
+    """Finished parts of jobs are used again where nothing changed that decides them."""
+    id = takes[1]["id"]
+    model = stored.models.get(linear(client)["id"])
+
+    def identity() -> dict[str, Any]:
+        return ModelWork.of(stored, model, [stored.takes.get(id)]).identity
+
+    whole = identity()
+    client.post(f"/takes/{id}/left-out", {"from_s": WRONG[0], "to_s": WRONG[1]})
+    assert identity() != whole
+    client.post(f"/takes/{id}/left-out/undo", {})
+    assert identity() == whole
 
 
 @pytest.mark.parametrize(

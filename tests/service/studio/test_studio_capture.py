@@ -219,6 +219,7 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
     page.get_by_role("region", name="Reference").locator("input[type=file]").set_input_files(reference)
     told = page.get_by_role("region", name="Reference").get_by_role("status")
     expect(told).to_contain_text("measured rotations")
+    expect(page.get_by_text("all others rest")).to_be_visible()
     take = next(each for each in asked(address, "takes", subject=SUBJECT) if each["name"] == name)
     assert take["rotations"]
     assert asked(address, f"videos/{take['id']}")["simulated"], "shown beside the take"
