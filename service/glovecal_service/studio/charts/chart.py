@@ -10,7 +10,6 @@ from nicegui.element import Element
 
 # Registers ECharts under the name that our modules import it by.
 from nicegui.elements.echart import echart as _echart  # noqa: F401
-from nicegui.events import GenericEventArguments
 
 from glovecal_models.comparison.series.answer import ResidualColumn, Series
 from glovecal_models.improvement.fall.answer import FallStep, FloorBand
@@ -116,18 +115,12 @@ class TimeChart(Chart, component="time_chart.js"):
     def on_moment(self, chosen: Callable[[str, float], Awaitable[None]]) -> None:
         """Call with the take's id and seconds by its clock where cursor A was put."""
 
-        async def told(event: GenericEventArguments) -> None:
-            await chosen(str(event.args["take"]), float(event.args["at_s"]))
-
-        self.on("moment", told)
+        self.on("moment", lambda event: chosen(str(event.args["take"]), float(event.args["at_s"])))
 
     def on_window(self, chosen: Callable[[float, float], Awaitable[None]]) -> None:
         """Call with the linked seconds that are shown after zooming and moving."""
 
-        async def told(event: GenericEventArguments) -> None:
-            await chosen(float(event.args["from_s"]), float(event.args["to_s"]))
-
-        self.on("window", told)
+        self.on("window", lambda event: chosen(float(event.args["from_s"]), float(event.args["to_s"])))
 
 
 def worst_moment(series: Series) -> tuple[str, float]:

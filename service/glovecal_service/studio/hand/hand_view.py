@@ -14,7 +14,6 @@ from nicegui.element import Element
 
 # Registers three.js under the name that our module imports it by.
 from nicegui.elements.scene import scene as _scene  # noqa: F401
-from nicegui.events import GenericEventArguments
 
 from glovecal_service.rest.model.answer import ReplayView
 from glovecal_service.rest.take.answer import HandBeside, Take, Video
@@ -70,10 +69,7 @@ class HandView(Element, component="hand_view.js", esm={"glovecal-hand": "esm"}):
     def on_rotation(self, chosen: Callable[[str], Any]) -> None:
         """Call with the rotation whose joint was clicked."""
 
-        def told(event: GenericEventArguments) -> Any:
-            return chosen(str(event.args))
-
-        self.on("rotation", told)
+        self.on("rotation", lambda event: chosen(str(event.args)))
 
 
 def side_buttons(*views: HandView, sides: Sequence[Side] = SIDES) -> None:
