@@ -200,3 +200,26 @@ def test_no_text_is_an_id_by_accident(sqlite_store, id):
             get(id)
     with pytest.raises((NotFound, BadInput)):
         sqlite_store.models.get(id)
+
+
+def test_a_stretch_that_was_left_out_stays_where_it_was_when_earlier_frames_come_later(anna):
+    whole = make_take(1)
+    record = add(anna, whole.some(whole.time_s >= 1.0, whole.reference_time_s >= 1.0))
+    anna.takes.leave_out(record.id, (0.5, 1.5))
+    before = anna.takes.load(record.id)
+    repaired = anna.takes.repair(record.id, whole, {"complete": True})
+    assert repaired.left_out == ((1.5, 2.5),)
+    after = anna.takes.load(record.id)
+    assert np.array_equal(after.time_s[after.time_s >= 1.0], before.time_s)
+    assert anna.takes.use_again(record.id).left_out == ()
+    assert np.array_equal(anna.takes.load(record.id).time_s, whole.time_s)
+
+
+def test_a_stretch_without_which_nothing_was_measured_is_not_left_out(anna):
+    take = make_take(2)
+    reference = take.reference.copy()
+    reference[take.time_s > 1.0] = np.nan
+    record = add(anna, dataclasses.replace(take, reference=reference))
+    with pytest.raises(BadInput, match="no measured angle of take 'bending' would be left"):
+        anna.takes.leave_out(record.id, (0.0, 1.0))
+    assert anna.takes.leave_out(record.id, (0.5, 1.0)).left_out == ((0.5, 1.0),)

@@ -19,6 +19,7 @@ from glovecal_models.presentation.document import (
     answer,
     counted,
 )
+from glovecal_models.takes.take import Stretch
 
 ClockVerdict = Literal["offset", "agrees", "not identifiable", "range too small"]
 
@@ -93,6 +94,8 @@ class TakeSeries:
     jumps: Sequence[JumpInTake]
     spectra: Curves
     """Amplitude of each sensor's movement over frequency, in counts; empty for a short take."""
+    left_out: Sequence[Stretch] = ()
+    """By a person, from training, comparison and diagnosis: from and to."""
 
 
 # How a table that some other program wrote is read, and what it would become.

@@ -6,7 +6,7 @@ The measured latency of a glove: how long after the hand its frames are stamped.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from glovecal_models.presentation.document import answer
 
 LONGEST_INTERPOLATED_GAP_S = 0.1
 """A reference is interpolated between its own samples only when they are closer than this."""
+Stretch = tuple[float, float]
+"""From and to, seconds; both ends belong to it."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ class Take:
     NaN where no angle was measured, and in whole columns that state none. None: nothing is stated."""
     excluded: tuple[ReferenceJump, ...] = ()
     """Angles that were measured and are NaN in ``reference``, as they jump away and come back."""
+    left_out: tuple[Stretch, ...] = ()
+    """Stretches by the take's clock whose frames and reference rows a person left out."""
 
     def __post_init__(self) -> None:
         frames, rows = len(self.time_s), len(self.reference_time_s)
@@ -111,6 +115,43 @@ class Take:
     @property
     def pre_roll_frames(self) -> int:
         return 0 if self.begins_s is None else int(np.searchsorted(self.time_s, self.begins_s))
+
+    @property
+    def left_out_since_start(self) -> tuple[Stretch, ...]:
+        """``left_out`` in seconds since the first frame that was recorded."""
+        began = min([float(self.time_s[0]), *(low for low, _ in self.left_out)])
+        return tuple((low - began, high - began) for low, high in self.left_out)
+
+    @property
+    def left_out_intervals(self) -> np.ndarray:
+        """(N - 1,) whether frames were left out between each frame and the next."""
+        after = np.searchsorted(self.time_s, [low for low, _ in self.left_out])
+        result = np.zeros(max(len(self.time_s) - 1, 0), bool)
+        result[[at - 1 for at in after if 0 < at < len(self.time_s)]] = True
+        return result
+
+    def some(self, frames: np.ndarray, rows: np.ndarray) -> Take:
+        """Only these frames and rows of the reference: masks (N,) and (R,)."""
+        return replace(
+            self,
+            time_s=self.time_s[frames],
+            readings=self.readings[frames],
+            reference_time_s=self.reference_time_s[rows],
+            reference=self.reference[rows],
+            reference_sd=None if self.reference_sd is None else self.reference_sd[rows],
+            context={name: column[frames] for name, column in self.context.items()},
+            poses=self.poses and tuple(self.poses[at] for at in np.flatnonzero(frames)),
+        )
+
+    def without(self, stretches: Sequence[Stretch]) -> Take:
+        """Without what lies in ``stretches``, seconds since the first frame and not before it: as if the
+        glove had sent nothing there, so that an effect with a memory meets a pause."""
+        if not stretches:
+            return self
+        began = float(self.time_s[0])
+        left_out = tuple((began + low, began + high) for low, high in sorted(stretches))
+        kept = self.some(_outside(self.time_s, left_out), _outside(self.reference_time_s, left_out))
+        return replace(kept, left_out=left_out)
 
     @property
     def has_own_reference_clock(self) -> bool:
@@ -155,6 +196,11 @@ class Take:
             result[:, column] = values
         result[: self.pre_roll_frames] = np.nan
         return result
+
+
+def _outside(time_s: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
+    inside = [(time_s >= low) & (time_s <= high) for low, high in stretches]
+    return ~np.any(inside, axis=0)
 
 
 def _require_shape(what: str, array: np.ndarray, shape: tuple[int, ...], take: str) -> None:

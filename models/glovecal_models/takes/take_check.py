@@ -145,6 +145,7 @@ def check_take(take: Take) -> TakeCheck:
     """Look at a take with at least one frame."""
     intervals = np.diff(take.time_s)
     typical = float(np.median(intervals)) if len(intervals) else None
+    intervals[take.left_out_intervals] = typical  # nothing was lost there
     gaps = 0 if typical is None else int((intervals > GAP_INTERVALS * typical).sum())
     changed = take.readings[1:] != take.readings[:-1]
     repeated = float((~changed.any(axis=1)).mean()) if len(changed) else 0.0
@@ -222,8 +223,15 @@ def take_warnings(takes: Sequence[Take]) -> list[str]:
 
 
 def excluded_sentences(takes: Sequence[Take]) -> list[str]:
-    """On reference angles that are excluded, as they jump away and come back."""
-    return alike_once([each for take in takes for each in jump_sentences(take, take.excluded)])
+    """On reference angles that are excluded, as they jump away and come back, and on what people left out."""
+    jumps = [each for take in takes for each in jump_sentences(take, take.excluded)]
+    return alike_once(jumps) + [left_out_sentence(take) for take in takes if take.left_out]
+
+
+def left_out_sentence(take: Take) -> str:
+    """Which stretches of it a person left out."""
+    stretches = ", ".join(f"{low:.2f} to {high:.2f} s" for low, high in take.left_out_since_start)
+    return f"Take {take.name!r}: left out by hand: {stretches}."
 
 
 def alike_once(sentences: Sequence[str]) -> list[str]:

@@ -91,6 +91,7 @@ def plan(store: Store, job: JobRecord) -> JobPlan:
         "layout": work.layout.to_document(),
         "takes": [[take.name, take.artifact] for take in takes],
         "holdout": [take.artifact for take in holdout],
+        "left_out": [take.left_out for take in (*work.takes, *work.holdout)],
         "settings": asdict(work.settings),
         "most_steps": asked.max_steps,
         "seed": asked.seed,

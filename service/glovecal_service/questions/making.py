@@ -22,7 +22,14 @@ from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.jobs.task_key import task_key
 from glovecal_service.plain import document_of, plain, read
 from glovecal_service.store import Store
-from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord, hand_of, incomplete_sentences
+from glovecal_service.store.records import (
+    LEFT_OUT,
+    JobRecord,
+    ModelRecord,
+    TakeRecord,
+    hand_of,
+    incomplete_sentences,
+)
 
 Request = TypeVar("Request", bound=BaseModel)
 Found = TypeVar("Found", bound=Answer)
@@ -130,7 +137,11 @@ def keep(
         hand=hand_of(takes),
         facts=plain(
             {
-                "takes": [{"id": take.id, "name": take.name, "artifact": take.artifact} for take in takes],
+                "takes": [
+                    {"id": take.id, "name": take.name, "artifact": take.artifact}
+                    | ({LEFT_OUT: take.left_out} if take.left_out else {})
+                    for take in takes
+                ],
                 "held_out_rmse_deg": error.get("rmse_deg"),
                 "rmse_unseen_wearing_deg": error.get("rmse_unseen_wearing_deg"),
                 "held_out_how": error.get("how"),

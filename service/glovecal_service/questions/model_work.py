@@ -54,7 +54,8 @@ class ModelWork:
     @property
     def identity(self) -> dict[str, Any]:
         """What decides the results of work on it, beside what is asked."""
-        return {"model": self.id, "takes": list(self.take_hashes)}
+        left_out = [take.left_out for take in self.takes]
+        return {"model": self.id, "takes": list(self.take_hashes), "left_out": left_out}
 
     @property
     def is_short(self) -> bool:

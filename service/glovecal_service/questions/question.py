@@ -123,6 +123,7 @@ class WorkOnTakes:
             "model": self.model,
             "layout": self.layout.to_document(),
             "takes": list(self.take_hashes),
+            "left_out": [take.left_out for take in self.takes],
             "declarations": list(self.declarations),
         }
 

@@ -54,14 +54,15 @@ class TrainingTakes:
             for record in records
             if record not in (*sampled, *shapes) and (record.has_reference or not record.sampling)
         )
-        incomplete = [*incomplete_sentences(records), *excluded_sentences(plain)]
-        if not sampled and not shapes:
-            return cls(plain, layout, settings, tuple(incomplete))
         taught = [
             LabelledTake.from_document(store.takes.load(record.id), record.sampling or {})
             for record in sampled
         ]
         taught += [shape_take(store.takes.load(record.id), record.hand_shape or "") for record in shapes]
+        every = [*plain, *(labelled.take for labelled in taught)]
+        incomplete = [*incomplete_sentences(records), *excluded_sentences(every)]
+        if not taught:
+            return cls(plain, layout, settings, tuple(incomplete))
         measured = subject.skeleton(hand_of(records)) if subject.dimensions else None
         if settings.method == "two_shapes":
             return cls((*named_takes(taught, measured), *plain), layout, settings, tuple(incomplete))

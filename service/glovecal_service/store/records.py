@@ -13,7 +13,7 @@ from glovecal_models.hand.rotations import HANDS, Handedness, is_of_hand, known_
 from glovecal_models.hand.skeleton import Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
 from glovecal_models.takes.session_drift import shape_of
-from glovecal_models.takes.take import KnownLatency
+from glovecal_models.takes.take import KnownLatency, Stretch
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -21,6 +21,8 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 CLOCK_UNKNOWN = "clock_unknown"
 """Fact of a take: a repair of clocks did not find that of its reference."""
+LEFT_OUT = "left_out"
+"""Fact of a take: stretches that people left out, in seconds since its first frame, the newest last."""
 
 FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
 OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
@@ -156,6 +158,11 @@ class TakeRecord:
             f"Take {self.name}: the clock of its reference was not found and not repaired, unlike others'; it"
             " is used as it is. Leave it out, or measure again."
         )
+
+    @property
+    def left_out(self) -> tuple[Stretch, ...]:
+        """Stretches that people left out, in seconds since its first frame, the newest last."""
+        return tuple((low, high) for low, high in self.facts.get(LEFT_OUT, ()))
 
     @property
     def sampling(self) -> dict[str, Any] | None:

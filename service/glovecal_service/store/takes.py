@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,14 @@ from glovecal_models.names import check_identifier
 from glovecal_models.takes.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.reference_jumps import without_jumps
-from glovecal_models.takes.take import Take, poses_at_frames
+from glovecal_models.takes.take import Stretch, Take, poses_at_frames
 from glovecal_service.store import tables
 from glovecal_service.store.blobs import Artifacts, check_sha256
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.gloves import latency_of_take
 from glovecal_service.store.list_part import WHOLE, ListPart
-from glovecal_service.store.records import CLOCK_UNKNOWN, TakeRecord
+from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
@@ -39,6 +39,9 @@ and the range of each rotation that it saw; None where another reference came af
 
 UNWRAPPED = "unwrapped"
 """Fact of a take: sentences on angles of its reference that are counted past a full turn."""
+
+AS_SHOWN_S = 0.006
+"""Ends of a stretch are shown with two digits, and taken so."""
 
 _SEARCHED = (
     "^id", "name", "subject", "wearing", "layout", "source", "^original_sha256", "^facts.read_as.shape",
@@ -135,9 +138,9 @@ class Takes:
             return part.count(connection, _chosen(subject), tables.takes, _SEARCHED)
 
     def load(self, id: str) -> Take:
-        """The take as it is worked with: ``load_recorded`` without angles that jump away and come back.
-        Raises NotFound, DamagedArtifact."""
-        return without_jumps(self.load_recorded(id))
+        """The take as it is worked with: ``load_recorded`` without what people left out, and without angles
+        that jump away and come back. Raises NotFound, DamagedArtifact."""
+        return without_jumps(self.load_recorded(id).without(self.get(id).left_out))
 
     def load_recorded(self, id: str) -> Take:
         """The take's arrays, verified, with what is known of its glove. Raises NotFound, DamagedArtifact."""
@@ -223,6 +226,56 @@ class Takes:
                 raise Conflict(f"take {id} was changed or removed meanwhile; look at it again")
             return _require(connection, id)
 
+    def leave_out(self, id: str, stretch: Stretch) -> TakeRecord:
+        """Leave frames and reference between two times, seconds since its first frame, out of all work with
+        the take; what is stored of it stays.
+
+        Raises NotFound, and BadInput for no stretch of it, and for one without which nothing is left.
+        """
+        (low, high), record = stretch, self.get(id)
+        if not 0.0 <= low < high or low > record.duration_s:
+            raise BadInput(
+                f"{low:g} to {high:g} s is no stretch of take {record.name!r}, which lasts "
+                f"{record.duration_s:.2f} s: give two different times inside it, the earlier one first"
+            )
+        stretch = (low, min(high, record.duration_s))
+        left = self.load_recorded(id).without([*record.left_out, stretch])
+        if left.pre_roll_frames == len(left.time_s):
+            raise BadInput(
+                f"no frame of take {record.name!r} would be left; leave out less of it, or remove the take"
+            )
+        if record.has_reference and not np.isfinite(left.reference).any():
+            raise BadInput(
+                f"no measured angle of take {record.name!r} would be left; leave out less of it, or choose "
+                "other takes to work with"
+            )
+        return self._note_left_out(id, lambda now: [*(each for each in now if each != stretch), stretch])
+
+    def use_again(self, id: str, stretch: Stretch | None = None) -> TakeRecord:
+        """Undo ``leave_out`` of that stretch, or the latest one. Raises NotFound, BadInput without it."""
+        record = self.get(id)
+        if not record.left_out:
+            raise BadInput(f"nothing of take {record.name!r} is left out: there is nothing to undo")
+        alike = [
+            each for each in record.left_out if stretch is None or np.allclose(each, stretch, atol=AS_SHOWN_S)
+        ]
+        if not alike:
+            known = ", ".join(f"{low:.2f} to {high:.2f} s" for low, high in record.left_out)
+            raise BadInput(
+                f"those seconds of take {record.name!r} are not what is left out: give one of {known}"
+            )
+        return self._note_left_out(id, lambda now: [each for each in now if each != alike[-1]])
+
+    def _note_left_out(self, id: str, change: Callable[[tuple[Stretch, ...]], list[Stretch]]) -> TakeRecord:
+        def changed(row: dict[str, Any]) -> dict[str, Any]:
+            facts = row["facts"]
+            now = tuple((low, high) for low, high in facts.get(LEFT_OUT, ()))
+            return {"facts": {**facts, LEFT_OUT: change(now)}}
+
+        with self._database.write() as connection:
+            change_rows(connection, tables.takes, tables.takes.c.id == id, changed)
+            return _require(connection, id)
+
     def repair(self, id: str, frames: Take, accounting: Mapping[str, Any]) -> TakeRecord:
         """Give a recorded take the frames that were fetched later; its reference and pose names stay.
 
@@ -240,7 +293,9 @@ class Takes:
             poses=before.poses and poses_at_frames(frames.time_s, before.time_s, before.poses),
         )
         found = {"accounting": dict(accounting), "frames_sha256": frames_hash(take)}
-        return self._replace(earlier, take, {}, **found)
+        later = float(before.time_s[0] - take.time_s[0])  # by so much the first frame is another one
+        left_out = [(low + later, high + later) for low, high in earlier.left_out]
+        return self._replace(earlier, take, {LEFT_OUT: left_out} if left_out else {}, **found)
 
     def use_layout(self, id: str, layout: Layout) -> TakeRecord:
         """Read a take's rotations as ``layout`` says from now on; its frames stay as they are.

@@ -189,6 +189,8 @@ def test_a_sampling_by_keyboard_alone_through_a_redo_a_reload_and_another_tab(
         press(page, "s", address, lambda view, before=now: view["say_number"] > before["say_number"])
         page.wait_for_timeout(150)
     page.get_by_role("heading", name="Done").wait_for()
+    expect(page.get_by_role("heading", name="What was recorded")).to_be_visible()
+    expect(page.get_by_role("group", name="Replay")).to_be_visible()
     assert not sampling(address)["open"]
     assert outcomes(address)["flat-start"] in ("good", "skipped")
     assert seen.complaints == []
@@ -210,10 +212,14 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
     page.keyboard.press("Enter")
     page.get_by_role("heading", name=f"{name}: done").wait_for()
     expect(page.get_by_text("in the service's folder films")).to_be_visible()
+    expect(page.get_by_role("group", name="Replay")).to_be_visible()
+    expect(page.get_by_text("readings alone")).to_be_visible()
+    expect(page.locator(".take-plot canvas")).to_be_visible()
     assert serious(page) == []
     page.get_by_role("region", name="Reference").locator("input[type=file]").set_input_files(reference)
     told = page.get_by_role("region", name="Reference").get_by_role("status")
     expect(told).to_contain_text("measured rotations")
+    expect(page.get_by_text("all others rest")).to_be_visible()
     take = next(each for each in asked(address, "takes", subject=SUBJECT) if each["name"] == name)
     assert take["rotations"]
     assert asked(address, f"videos/{take['id']}")["simulated"], "shown beside the take"

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import base64
+import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 from foreign_tables import laboratory, logger, semicolons
-from playwright.sync_api import Page, expect
-from studio_support import Open, serious
+from playwright.sync_api import Browser, Page, expect
+from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
 
@@ -192,3 +194,144 @@ def test_a_take_is_looked_at_with_another_over_it(opened: Open, client: RestClie
     assert seen.complaints == []
     missing = opened("take?id=0000").page
     expect(missing.get_by_text("There is no take 0000.")).to_be_visible()
+
+
+TIPS = "view => getElement(view).places().tips.index"
+"""Where the index finger's tip is, mm."""
+
+
+def hand_of(page: Page) -> int:
+    """The id of the hand's element."""
+    return int(page.locator(".take-hand").get_attribute("id").removeprefix("c"))  # pyright: ignore
+
+
+def stand_at(page: Page, seconds: float) -> list[float]:
+    """Move the slider there; where the index finger's tip is then."""
+    slider = page.get_by_role("slider", name="Moment of the take")
+    slider.fill(str(seconds))
+    expect(slider).to_have_attribute("aria-valuetext", re.compile(f"^{seconds:.2f} of"))
+    replay = page.locator(".take-replay").get_attribute("id")
+    page.wait_for_function(
+        "([replay, at]) => getElement(replay.slice(1)).part(at)", arg=[replay, seconds]
+    )  # longer takes come in parts
+    return page.evaluate(TIPS, hand_of(page))
+
+
+def test_the_hand_of_a_take_is_replayed_in_step_with_its_curves(opened: Open, client: RestClient) -> None:
+    take = client.get("/takes")[0]
+    part = client.get(f"/takes/{take['id']}/hand")
+    bends = [sum(row) for row in part["values"]]
+    straight, bent = (part["time_s"][bends.index(extreme(bends))] for extreme in (min, max))
+    seen = opened(f"take?id={take['id']}")
+    page = seen.page
+    expect(
+        page.get_by_text(f"Measured: {len(take['rotations'])} rotations; all others rest.")
+    ).to_be_visible()
+    line = page.locator(".take-cursor")
+    expect(line).to_be_visible()
+    places, lines = [], []
+    for at in (straight, bent):
+        places.append(stand_at(page, round(20 * at) / 20))
+        lines.append(line.bounding_box())
+    assert abs(places[0][0] - places[1][0]) > 40, "a bent finger's tip is nearer to the wrist"
+    assert (lines[0]["x"] < lines[1]["x"]) == (straight < bent)
+    stand_at(page, 0.0)
+    began = line.bounding_box()["x"]
+    page.get_by_label("Speed").select_option("4")
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_function("document.querySelector('.take-replay .replay-slider').value > 4")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play", exact=True).wait_for()
+    assert line.bounding_box()["x"] > began + 100
+    at = page.get_by_role("slider", name="Moment of the take")
+    plot = page.locator(".take-plot").bounding_box()
+    page.mouse.click(plot["x"] + 0.5 * plot["width"], plot["y"] + 60)
+    expect(at).to_have_attribute("aria-valuetext", re.compile(r"^[456]\.\d\d of"))
+    assert serious(page) == []
+    assert seen.complaints == []
+
+
+def test_a_stretch_is_left_out_and_used_again(opened: Open, client: RestClient) -> None:
+    take = client.get("/takes")[1]
+    seen = opened(f"take?id={take['id']}")
+    page = seen.page
+    page.locator(".take-plot canvas").wait_for()
+    stand_at(page, 2.0)
+    page.get_by_role("button", name="From here").click()
+    expect(page.get_by_label("From, s")).to_have_value("2")
+    page.get_by_label("To, s").fill("4.5")
+    expect(page.locator(".take-marked")).to_be_visible()
+    page.get_by_role("button", name="Leave out", exact=True).click()
+    expect(page.get_by_text("Left out: 2.00 to 4.50 s")).to_be_visible()
+    assert client.get(f"/takes/{take['id']}")["left_out"] == [[2.0, 4.5]]
+    expect(page.locator(".take-marked")).to_be_hidden()
+
+    plot = page.locator(".take-plot")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 70, steps=4)
+    page.mouse.up()
+    expect(page.get_by_label("To, s")).not_to_have_value("")
+    page.get_by_role("button", name="Leave out", exact=True).click()
+    expect(page.get_by_role("button", name="again")).to_have_count(2)
+
+    again = opened(f"take?id={take['id']}").page
+    expect(again.get_by_text("Left out: 2.00 to 4.50 s")).to_be_visible()
+    again.get_by_role("button", name="Undo: use 2.00 to 4.50 s again").click()
+    expect(again.get_by_role("button", name="again")).to_have_count(1)
+    again.get_by_role("button", name="again").click()
+    expect(again.get_by_role("button", name="again")).to_have_count(0)
+    assert client.get(f"/takes/{take['id']}")["left_out"] == []
+    again.get_by_role("button", name="Leave out", exact=True).click()
+    expect(again.get_by_text("Say from when to when")).to_be_visible()
+    assert serious(again) == []
+    assert seen.complaints == []
+
+
+def test_the_raw_hand_moves_where_nothing_was_measured(
+    opened: Open, client: RestClient, tmp_path: Path
+) -> None:
+    rows = "".join(f"{i / 50:.2f},300,{400 + 200 * math.sin(i / 40):.0f}\n" for i in range(3000))
+    (tmp_path / "bare.csv").write_text(f"time_s,s.I_MCP,s.I_PIP\n{rows}")
+    client.post("/subjects", {"name": "bare"})
+    layout = client.get("/takes")[0]["layout"]
+    [take] = client.upload_takes(tmp_path / "bare.csv", subject="bare", layout=layout)["takes"]
+    seen = opened(f"take?id={take['id']}")
+    page = seen.page
+    expect(page.get_by_text("Nothing was measured, and there is no model: readings alone.")).to_be_visible()
+    tips = []
+    for at in (1.25, 3.75, 41.45):  # the greatest reading, the least one; the greatest again, in another part
+        stand_at(page, at)
+        tips.append(page.evaluate("view => getElement(view).placesOfRaw().tips.index", hand_of(page)))
+    assert abs(tips[0][0] - tips[1][0]) > 20
+    assert tips[0] == pytest.approx(tips[2], abs=1.0)
+    assert len([url for url in seen.asked if "/hand?" in url]) == 2
+    assert seen.complaints == []
+
+
+def test_a_stretch_is_left_out_by_touch_on_a_phone(
+    browser: Browser, address: str, client: RestClient
+) -> None:
+    take = client.get("/takes")[2]
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{address}/studio/take?id={take['id']}")
+    page.get_by_text(f"Measured: {len(take['rotations'])} rotations; all others rest.").wait_for()
+    plot = page.locator(".take-plot")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + 60)
+    at = page.get_by_role("slider", name="Moment of the take")
+    expect(at).not_to_have_attribute("aria-valuetext", re.compile(r"^0\.00 of"))
+    page.get_by_role("button", name="To here").tap()
+    stand_at(page, 1.5)
+    page.get_by_role("button", name="From here").tap()
+    expect(page.get_by_label("From, s")).to_have_value("1.5")
+    page.get_by_role("button", name="Leave out", exact=True).tap()
+    page.get_by_role("button", name="again").tap()
+    expect(page.get_by_role("button", name="again")).to_have_count(0)
+    assert client.get(f"/takes/{take['id']}")["left_out"] == []
+    context.close()

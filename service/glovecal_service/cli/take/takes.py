@@ -99,6 +99,7 @@ def _facts(found: CheckView) -> dict[str, Any]:
         "added": take.created_at,
         "frames": f"{take.frames} in {take.duration_s:.2f} s",
         **({"pre-roll": f"{found.pre_roll_frames} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
+        **({"left out": _left_out(take)} if take.left_out else {}),
         "state": take.state,
         **({} if sent is None else {"frames sent": sent}),
         "rate (Hz)": found.rate_hz,
@@ -200,6 +201,33 @@ def use_layout(
         for row in wanted:
             service.put(f"/takes/{row.id}/layout", {"layout": layout})
     out.print(f"Read by layout {layout} from now on: {', '.join(row.name for row in wanted) or 'no take'}.")
+
+
+@app.command("leave-out")
+def leave_out(
+    take: Take,
+    from_s: Annotated[
+        float | None, typer.Option("--from", help="Begin of the stretch, seconds since the first frame.")
+    ] = None,
+    to_s: Annotated[float | None, typer.Option("--to", help="Its end.")] = None,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Use that stretch again; without --from and --to the last one.")
+    ] = False,
+) -> None:
+    """Leave a stretch out of training, comparison and diagnosis, or use it again; stored data stay."""
+    if (from_s is None) != (to_s is None) or (from_s is None and not undo):
+        raise typer.BadParameter("say which stretch: --from SECONDS --to SECONDS")
+    stretch = None if from_s is None else {"from_s": from_s, "to_s": to_s}
+    with connect() as service:
+        path = f"/takes/{_id(service, take)}/left-out"
+        answer = service.post(f"{path}/undo", {"stretch": stretch}) if undo else service.post(path, stretch)
+    row = read(TakeRow, answer)
+    out.print(f"Take {row.name}: {_left_out(row) or 'nothing'} left out.")
+    err.print("Existing models are unchanged; train again.")
+
+
+def _left_out(take: TakeRow) -> str:
+    return ", ".join(f"{low:.2f} to {high:.2f} s" for low, high in take.left_out)
 
 
 @app.command("remove")

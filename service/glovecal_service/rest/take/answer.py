@@ -10,7 +10,7 @@ from pydantic import Field
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.camera_estimates import CoveredRange
 from glovecal_models.takes.hand_clocks import How
-from glovecal_models.takes.take import ReferenceJump
+from glovecal_models.takes.take import ReferenceJump, Stretch
 from glovecal_models.takes.take_check import RotationRange, SensorRange
 from glovecal_service.plain import Row
 
@@ -35,6 +35,10 @@ class Take(Row):
         description="The session's shape that is held; methods template and two_shapes learn from it."
     )
     duration_s: float
+    left_out: list[Stretch] = Field(
+        description="By a person, from training, comparison and diagnosis: from and to in seconds since its "
+        "first frame, the newest last."
+    )
     simulated: bool
     recording: str | None
     state: Literal["complete", "repairing"] = Field(
@@ -53,6 +57,26 @@ class Take(Row):
     def sent(self) -> int | None:
         """Frames that the glove sent, where it was recorded here."""
         return (self.accounting or {}).get("sent")
+
+
+class HandOverTime(Row):
+    """What a take's hand is seen to do in a part of it."""
+
+    source: Literal["reference", "model", "raw"] = Field(
+        description="Measured angles, a model's, or readings alone."
+    )
+    model: str | None
+    from_s: float = Field(description="Seconds since the take's first frame, as all times here.")
+    to_s: float = Field(description="Where the next part begins; the take's end in the last one.")
+    names: list[str] = Field(description="Rotations; sensors where the source is raw.")
+    time_s: list[float]
+    values: list[list[float | None]] = Field(
+        description="Degrees frame by frame, counts where the source is raw; null where nothing is known."
+    )
+    spans: list[Stretch] = Field(
+        description="Least and greatest reading of each sensor in the whole take; empty unless raw."
+    )
+    sentence: str
 
 
 class CheckView(Row):

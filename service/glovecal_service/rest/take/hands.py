@@ -52,5 +52,5 @@ def hand_alignment(
     """Of two stored takes. Raises NotFound, and BadInput where claps do not tell."""
     records = store.takes.get(first), store.takes.get(second)
     clocks = TakeClock.of_accounting(records[0].accounting), TakeClock.of_accounting(records[1].accounting)
-    takes = [store.takes.load(record.id) for record in records]
+    takes = [store.takes.load_recorded(record.id) for record in records]
     return align(takes[0], takes[1], clocks, claps=claps), clocks

@@ -165,4 +165,4 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
             f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "
             f"say it of the subject: glovecal subject measure {record.subject} --hand left"
         )
-    return HandTake(parts.store.takes.load(record.id), subject, side, artifact, record.accounting)
+    return HandTake(parts.store.takes.load_recorded(record.id), subject, side, artifact, record.accounting)

@@ -70,7 +70,7 @@ def _attach(parts: Parts, id: str, named: tuple[str, Path], clock: ReferenceCloc
         )
     time_s = _on_take_clock(rows.time_s, clock, record)
     take = replace(
-        parts.store.takes.load(id),
+        parts.store.takes.load_recorded(id),
         reference_time_s=time_s,
         rotations=rows.rotations,
         reference=rows.reference,
@@ -134,7 +134,7 @@ def _attach_camera(
 ) -> CameraReferenceView:
     with parts.uploads.under_names(named) as (path,):
         estimates = read_estimates(path)
-    take = parts.store.takes.load(id)
+    take = parts.store.takes.load_recorded(id)
     if estimates.simulated and not take.simulated:
         raise BadInput(f"{named[0]} was simulated or rendered; take {take.name!r} was recorded")
     found = reference_from_camera(take, estimates, near_s=search[0], within_s=search[1])

@@ -9,6 +9,7 @@ from typing import Literal
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse
+from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
 
 from glovecal_models.takes.take import Take as TakeArrays
@@ -77,6 +78,38 @@ def put_layout(id: IdInPath, body: TakeLayout, store: StoreNeeded) -> TakeRecord
     """Frames and reference stay as they are; models that were trained on the take stay what they are. 422
     when the take lacks a sensor of the layout."""
     return store.takes.use_layout(id, store.layouts.get(body.layout))
+
+
+class LeftOut(StrictBody):
+    from_s: FiniteFloat = Field(description="Seconds since its first frame.")
+    to_s: FiniteFloat
+
+
+@router.post(
+    "/{id}/left-out",
+    response_model=Take,
+    summary="Leave a stretch of a take out",
+    responses=change_problems(),
+)
+def leave_out(id: IdInPath, body: LeftOut, store: StoreNeeded) -> TakeRecord:
+    """Of training, comparison and diagnosis from now on, as if no frame had come there. What is stored of the
+    take stays, and so do models that were trained on it."""
+    return store.takes.leave_out(id, (body.from_s, body.to_s))
+
+
+class UsedAgain(StrictBody):
+    stretch: LeftOut | None = Field(None, description="null: the one that was left out last.")
+
+
+@router.post(
+    "/{id}/left-out/undo",
+    response_model=Take,
+    summary="Use a stretch of a take again",
+    responses=change_problems(),
+)
+def use_again(id: IdInPath, body: UsedAgain, store: StoreNeeded) -> TakeRecord:
+    again = None if body.stretch is None else (body.stretch.from_s, body.stretch.to_s)
+    return store.takes.use_again(id, again)
 
 
 @router.delete(

@@ -75,7 +75,7 @@ def attach_preview(parts: Parts, take: TakeRecord, preview: Path) -> Video:
             f"take {take.name!r} was captured by another computer's clock, or before it restarted: the "
             "video's times mean nothing there. Film on the computer that captures."
         )
-    time_s = parts.store.takes.load(take.id).time_s
+    time_s = parts.store.takes.load_recorded(take.id).time_s
     if facts.times_s[-1] < time_s[0] or facts.times_s[0] > time_s[-1]:
         raise Conflict(
             f"the video lasts from {facts.times_s[0]:.1f} to {facts.times_s[-1]:.1f} s and take "
@@ -118,7 +118,7 @@ def get_hand(
     take, facts = parts.store.takes.get(id), parts.videos.facts(id)
     found, _ = parts.predictors.get(parts.store.models.get(model).id)
     skeleton = parts.store.subjects.get(take.subject).skeleton(take.known_hand)
-    motion = motion_of(parts.store.takes.load(id), found, skeleton, "hand")
+    motion = motion_of(parts.store.takes.load_recorded(id), found, skeleton, "hand")
     at, time_s = np.array(facts.times_s), motion.time_s
     inside = (at >= time_s[0]) & (at <= time_s[-1])
     shown = at_times(motion, np.clip(at, time_s[0], time_s[-1]))

@@ -10,7 +10,6 @@ from nicegui.element import Element
 
 # Registers ECharts under the name that our modules import it by.
 from nicegui.elements.echart import echart as _echart  # noqa: F401
-from nicegui.events import GenericEventArguments
 
 from glovecal_models.comparison.series.answer import ResidualColumn, Series
 from glovecal_models.improvement.fall.answer import FallStep, FloorBand
@@ -54,6 +53,20 @@ class TakeChart(Chart, component="take_chart.js"):
     def show(self, takes: Sequence[TakeSeries], *, spectra: bool) -> None:
         """One take, or two over each other."""
         self._draw({"takes": [asdict(take) for take in takes], "spectra": spectra})
+
+    def choose(self, from_s: float | None, to_s: float | None) -> None:
+        """Mark a stretch as it would be left out; none where an end is missing."""
+        self.run_method("choose", from_s, to_s)
+
+    def on_moment(self, chosen: Callable[[float], Any]) -> None:
+        """Call with the seconds since the first frame where it was clicked."""
+
+        self.on("moment", lambda event: chosen(float(event.args)))
+
+    def on_stretch(self, chosen: Callable[[float, float], Any]) -> None:
+        """Call with the two ends between which a mouse was drawn over it."""
+
+        self.on("stretch", lambda event: chosen(*map(float, event.args)))
 
 
 class FallChart(Chart, component="fall_chart.js"):
@@ -102,18 +115,12 @@ class TimeChart(Chart, component="time_chart.js"):
     def on_moment(self, chosen: Callable[[str, float], Awaitable[None]]) -> None:
         """Call with the take's id and seconds by its clock where cursor A was put."""
 
-        async def told(event: GenericEventArguments) -> None:
-            await chosen(str(event.args["take"]), float(event.args["at_s"]))
-
-        self.on("moment", told)
+        self.on("moment", lambda event: chosen(str(event.args["take"]), float(event.args["at_s"])))
 
     def on_window(self, chosen: Callable[[float, float], Awaitable[None]]) -> None:
         """Call with the linked seconds that are shown after zooming and moving."""
 
-        async def told(event: GenericEventArguments) -> None:
-            await chosen(float(event.args["from_s"]), float(event.args["to_s"]))
-
-        self.on("window", told)
+        self.on("window", lambda event: chosen(float(event.args["from_s"]), float(event.args["to_s"])))
 
 
 def worst_moment(series: Series) -> tuple[str, float]:

@@ -171,6 +171,12 @@ export default {
       this.readings = readings;
       this.showRaw();
     },
+    /** Readings of a recording; `spans` are those of all of it. */
+    showReadings(readings, spans) {
+      this.spans = new Map(Object.entries(spans));
+      this.readings = readings;
+      this.showRaw();
+    },
     /** Angles of a hand whose joints are linear in one sensor each; one that has hardly moved rests. */
     uncalibrated() {
       const angles = {};

@@ -14,10 +14,9 @@ from nicegui.element import Element
 
 # Registers three.js under the name that our module imports it by.
 from nicegui.elements.scene import scene as _scene  # noqa: F401
-from nicegui.events import GenericEventArguments
 
 from glovecal_service.rest.model.answer import ReplayView
-from glovecal_service.rest.take.answer import HandBeside, Video
+from glovecal_service.rest.take.answer import HandBeside, Take, Video
 from glovecal_service.studio.heading import act
 
 Side = Literal["back", "palm", "side", "corner"]
@@ -70,10 +69,7 @@ class HandView(Element, component="hand_view.js", esm={"glovecal-hand": "esm"}):
     def on_rotation(self, chosen: Callable[[str], Any]) -> None:
         """Call with the rotation whose joint was clicked."""
 
-        def told(event: GenericEventArguments) -> Any:
-            return chosen(str(event.args))
-
-        self.on("rotation", told)
+        self.on("rotation", lambda event: chosen(str(event.args)))
 
 
 def side_buttons(*views: HandView, sides: Sequence[Side] = SIDES) -> None:
@@ -106,6 +102,25 @@ class Replay(Element, component="replay.js"):
 
 
 ROOT = "/v1"
+
+
+class TakeReplay(Element, component="take_replay.js"):
+    """A take's hand over its whole time: play, pause, a slider, the speed, and a cursor in its chart."""
+
+    def __init__(self, hand: HandView, chart: Element, take: Take, model: str | None) -> None:
+        """``model``: whose poses are shown where nothing was measured."""
+        super().__init__()
+        address = f"{ROOT}/takes/{take.id}/hand" + (f"?model={model}" if model else "")
+        self._props.update(hand=hand.id, chart=chart.id, address=address, duration=take.duration_s, start=0)
+
+    def seek(self, at_s: float) -> None:
+        """Go to a moment, seconds since the take's first frame, and stand there."""
+        self.run_method("seek", at_s)
+
+    def on_edge(self, chosen: Callable[[Literal["from", "to"], float], Any]) -> None:
+        """Call with the moment at which a stretch is to begin, or to end."""
+
+        self.on("edge", lambda event: chosen(event.args["edge"], float(event.args["at_s"])))
 
 
 class VideoBeside(Element, component="video_beside.js"):

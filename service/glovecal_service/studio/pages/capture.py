@@ -18,6 +18,7 @@ from glovecal_service.studio.pages.capture_recording import RecordingPage
 from glovecal_service.studio.pages.capture_sampling import SamplingPage
 from glovecal_service.studio.pages.capture_session import SessionPage
 from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
+from glovecal_service.studio.pages.take_view import add_take_styles
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -43,6 +44,7 @@ def add(studio: Studio) -> None:
     async def capture(mode: str = "", sampling: str = "", proposal: str = "") -> None:
         wanted = mode if mode in MODES else "recording" if proposal else "sampling"
         async with shell(studio, "capture", "Capture"):
+            add_take_styles()
             await CapturePage(studio, wanted).build(sampling, proposal)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 from nicegui import ui
+from nicegui.events import ValueChangeEventArguments
 
 from glovecal_models.calibration.answer import Trained
 from glovecal_models.quick_check.answer import CheckedWearing
@@ -15,6 +17,7 @@ from glovecal_service.rest.sampling.answer import SamplingView
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.heading import act, heading, main_act
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.pages.take_view import TakeView
 from glovecal_service.studio.served_label import ServedLabel
 from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
@@ -52,6 +55,9 @@ class SamplingEnd:
                 ui.link("New sampling", "/capture?mode=sampling").classes("studio-link")
             self._watch = JobWatch(self._studio, self._trained)
             self._after = ui.element("div").classes("findings").props('aria-live="polite"')
+            if view.takes:
+                with refusals():
+                    await RecordedTakes(self._studio, view.takes).build()
         if view.takes and view.protocol == SECOND_WEARING:
             await self._check()
 
@@ -136,3 +142,28 @@ class SamplingEnd:
             await self._studio.service.post(f"/models/{model}/activate")
             with self._after:
                 ServedLabel(self._studio, self._view.glove, model, "The checked model is active")
+
+
+class RecordedTakes:
+    """The takes of a sampling, one looked at at a time."""
+
+    def __init__(self, studio: Studio, takes: Sequence[str]) -> None:
+        self._studio = studio
+        self._takes = takes
+
+    async def build(self) -> None:
+        service = self._studio.service
+        self._known = [await service.read(Take, f"/takes/{id}") for id in self._takes]
+        names = {take.id: take.line for take in self._known}
+        heading(2, "What was recorded")
+        ui.select(names, value=self._known[0].id, label="Take", on_change=self._choose).classes("choice")
+        self._place = ui.element("div")
+        await self._show(self._known[0].id)
+
+    async def _choose(self, event: ValueChangeEventArguments) -> None:
+        await self._show(event.value)
+
+    async def _show(self, id: str) -> None:
+        self._place.clear()
+        with self._place:
+            await TakeView(self._studio, next(take for take in self._known if take.id == id)).build()

@@ -12,10 +12,12 @@ from nicegui import ui
 from glovecal_models.diagnosis.answer import MissingEffects
 from glovecal_models.improvement.answer import Improved
 from glovecal_service.rest.glove.answer import Film, GloveView, Recording
+from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
 from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
 from glovecal_service.studio.pages.take_reference import TakeReference
+from glovecal_service.studio.pages.take_view import TakeView
 from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 
@@ -49,6 +51,7 @@ class RecordingPage:
         self._films = False
         """A video goes on that was begun here."""
         self._filmed = ""
+        self._looked_at: tuple[str, ui.element | None] = "", None
 
     async def build(self, proposing: MissingEffects | Improved | None) -> None:
         """``proposing``: a diagnosis, or an improvement's last, that wants something to be recorded."""
@@ -83,7 +86,7 @@ class RecordingPage:
         with ui.element("div").classes("capture-acts"):
             self._main = main_act("Start recording", partial(self._act, "main"), large=True)
         self._account = ui.element("div").classes("findings").props('aria-live="polite"')
-        self._reference = TakeReference(self._studio)
+        self._reference = TakeReference(self._studio, self._look_at)
         await self._reference.build()
         self._recording = await self._going_on()
         self._timer = ui.timer(EVERY_S, self._look)
@@ -186,7 +189,18 @@ class RecordingPage:
                 await self._tell_video(account.take)
             if account.take:
                 ui.label(f"Take {account.take}.").classes("version-id")
+                self._looked_at = account.take, ui.element("div")
+                await self._look_at(account.take)
                 await self._reference.choose(account.take)
+
+    async def _look_at(self, take: str) -> None:
+        """What was recorded last, if that take is it."""
+        last, place = self._looked_at
+        if place is not None and take == last:
+            own = await self._studio.service.read(Take, f"/takes/{take}")
+            place.clear()
+            with place:
+                await TakeView(self._studio, own).build()
 
     async def _film_line(self) -> str:
         if not self._films:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -11,11 +11,12 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from glovecal_service.rest.glove.answer import GloveView, LayoutView
+from glovecal_service.rest.glove.answer import GloveView
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.amounts import version_name
 from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.hand.hand_view import SIDES, HandView
+from glovecal_service.studio.hand.raw_hand import RawHand
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.explained_joint import ExplainedJoint
 from glovecal_service.studio.pages.refine_by_hand import RefineByHand
@@ -24,10 +25,6 @@ from glovecal_service.studio.strips.live_values import AngleList, SensorStrips
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import fact_list
 
-LEAST_SHARE = 0.1
-"""Of a sensor's counts it has to have gone through before the raw hand follows it."""
-LEAST_COUNTS = 20.0
-"""Where the layout does not say what its sensors count."""
 RAW_IS = (
     "Raw (violet) is no calibration: each sensor alone, drawn linearly from its least to its greatest "
     "reading since this page was opened, over the joint's usual range. Open and close the hand once; what "
@@ -99,7 +96,7 @@ class GloveCard:
     async def _fill(self, glove: GloveView | None) -> None:
         feed = f"/studio/feed/{quote(self._glove)}"
         skeleton = await self._skeleton(glove)
-        reads, least = await self._raw_reading(glove)
+        raw = await RawHand.of(self._studio.service, glove and glove.layout)
         self._worn, self._models, self._active = _worn(glove), {}, None
         self._is_offered = False
         if self._joint is not None:
@@ -120,7 +117,7 @@ class GloveCard:
                         skeleton, label=f"Hand of glove {self._glove}, live", feed=feed,
                         empty="No calibrated pose",
                     ).classes("glove-hand")  # fmt: skip
-                    self._view_acts(view, reads, least)
+                    self._view_acts(view, raw)
                     self._joint = ExplainedJoint(self._studio, self._glove, view)
                     self._refine = RefineByHand(self._studio, self._look_again)
                 with ui.element("div").classes("glove-values"):
@@ -129,26 +126,24 @@ class GloveCard:
                     SensorStrips(feed, label=f"Readings of glove {self._glove}, last seconds")
         await self._offer_models(glove)
 
-    def _view_acts(self, view: HandView, reads: Mapping[str, str], least: float) -> None:
+    def _view_acts(self, view: HandView, raw: RawHand) -> None:
         with ui.row().classes("glove-acts"):
             with ui.element("div").classes("glove-sides").props('role="group" aria-label="Seen from"'):
                 for side in SIDES:
                     _act(side.capitalize(), partial(view.look, side))
             with ui.element("div").classes("glove-sides").props('role="group" aria-label="Hands shown"'):
                 _switch("Calibrated", True, view.calibrated)
-                self._turn_raw = _switch(
-                    "Raw", False, lambda shown: self._show_raw(view, reads, least, shown)
-                )
+                self._turn_raw = _switch("Raw", False, lambda shown: self._show_raw(view, raw, shown))
         self._raw_is = ui.label(RAW_IS).classes("glove-raw-is")
         self._raw_is.set_visibility(False)
-        view.raw(reads, least=least, shown=False)
+        raw.show(view, False)
         with ui.element("div").classes("sd-scale").props('role="note"'):
             ui.label("Colour and size of a joint: standard deviation of its angle, 0°")
             ui.element("span").classes("sd-scale-bar")
             ui.label("8° and more")
 
-    def _show_raw(self, view: HandView, reads: Mapping[str, str], least: float, shown: bool) -> None:
-        view.raw(reads, least=least, shown=shown)
+    def _show_raw(self, view: HandView, raw: RawHand, shown: bool) -> None:
+        raw.show(view, shown)
         self._raw_is.set_visibility(shown)
 
     async def _skeleton(self, glove: GloveView | None) -> dict[str, Any]:
@@ -158,22 +153,6 @@ class GloveCard:
             with suppress(Refusal):
                 return await self._studio.service.get(f"/subjects/{quote(glove.subject)}/skeleton", hand=hand)
         return await self._studio.service.get("/skeleton", hand=hand)
-
-    async def _raw_reading(self, glove: GloveView | None) -> tuple[dict[str, str], float]:
-        """The sensor that each rotation of the raw hand is read from, and how far it has to have moved."""
-        if not glove or not glove.layout:
-            return {}, LEAST_COUNTS
-        try:
-            layout = await self._studio.service.read(LayoutView, f"/gloves/{quote(glove.layout)}")
-        except Refusal:
-            return {}, LEAST_COUNTS
-        reads = {
-            rotation: rotation if rotation in sensors else sensors[0]
-            for rotation, sensors in layout.read_from.items()
-            if sensors
-        }
-        counts = layout.document.get("counts")
-        return reads, LEAST_SHARE * (counts[1] - counts[0]) if counts else LEAST_COUNTS
 
     async def _offer_models(self, glove: GloveView | None) -> None:
         """The models of the wearer; what is active elsewhere is chosen here."""

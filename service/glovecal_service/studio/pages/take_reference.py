@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
@@ -24,8 +24,10 @@ MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet"}
 class TakeReference:
     """Angles measured elsewhere, attached to a take; and whether their clock is the glove's."""
 
-    def __init__(self, studio: Studio) -> None:
+    def __init__(self, studio: Studio, changed: Callable[[str], Awaitable[None]]) -> None:
+        """``changed`` is called with the id of a take that has another reference, or one moved in time."""
         self._studio = studio
+        self._changed = changed
 
     async def build(self) -> None:
         with ui.element("section").classes("card capture-form").props('aria-label="Reference"'):
@@ -76,6 +78,7 @@ class TakeReference:
             self._told.set_text(
                 f"{take.name} has {len(take.rotations)} measured rotations. Check its clock next."
             )
+            await self._changed(take.id)
 
     async def _check(self, repair: bool) -> None:
         await self._ask_clock("/takes/clocks", {"repair": repair})
@@ -96,3 +99,4 @@ class TakeReference:
                 if isinstance(each, TakeClock)
             ]
             self._told.set_text(" ".join(said) or ("Moved back." if found else "Nothing was moved."))
+            await self._changed(self._take.value)

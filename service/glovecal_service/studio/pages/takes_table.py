@@ -43,7 +43,7 @@ class TakesTable:
                     cell(take.subject)
                     cell(take.wearing or "–")
                     cell(moment(take.created_at))
-                    cell(f"{take.duration_s:.1f} s")
+                    cell(f"{take.duration_s:.1f} s" + (", in part left out" if take.left_out else ""))
                     cell(str(take.frames))
                     gaps = cell("…")
                     cell(_measured(take))
