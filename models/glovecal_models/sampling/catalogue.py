@@ -152,6 +152,11 @@ def make_protocol(
     return protocol if seed is None or name == "five_shapes" else in_random_order(protocol, seed)
 
 
+def method_for(name: str) -> str:
+    """The method of calibration that learns from the takes of one of ``PROTOCOLS``."""
+    return "template" if name == "five_shapes" else "lmc_gpr"
+
+
 def _in_fixed_order(name: str, layout: Layout, own: Equipment) -> Protocol:
     _check(own)
     if name == "active":

@@ -267,6 +267,26 @@ def test_the_active_protocol_goes_on_by_a_still_hand(opened: Open, address: str)
 
 
 @pytest.mark.slow
+def test_five_hand_shapes_end_with_a_template_that_is_not_live_unasked(opened: Open, address: str) -> None:
+    seen = opened("capture")
+    page = seen.page
+    page.emulate_media(reduced_motion="reduce")
+    page.get_by_role("button", name="Start sampling").wait_for()
+    choose(page, "Protocol", "Five hand shapes")
+    choose(page, "A step starts", "By timer: steps")
+    page.get_by_role("button", name="Start sampling").click()
+    in_phase(page, "waiting", "ready", "now")
+    page.get_by_role("heading", name="Done").wait_for(timeout=600_000)
+    page.get_by_role("button", name="Train a template").click()
+    page.get_by_text("Trained. Live poses do not come from it.").wait_for(timeout=300_000)
+    made = asked(address, "models", subject=SUBJECT)[-1]
+    assert (made["method"], made["active"]) == ("template", False)
+    page.get_by_role("button", name="Use it live").click()
+    page.get_by_text("The trained model is active, and served").wait_for(timeout=300_000)
+    assert seen.complaints == []
+
+
+@pytest.mark.slow
 def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Open, address: str) -> None:
     seen = opened("capture")
     page = seen.page
@@ -278,6 +298,7 @@ def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Op
     page.get_by_role("button", name="Start sampling").click()
     in_phase(page, "waiting", "ready", "now")
     page.get_by_role("heading", name="Done").wait_for(timeout=600_000)
+    page.get_by_role("checkbox", name="Live poses come from it").click()
     page.get_by_role("button", name="Train a model").click()
     page.get_by_text("Trained, and served: the poses of").wait_for(timeout=300_000)
     assert [each["active"] for each in asked(address, "models", subject=SUBJECT)] == [True]

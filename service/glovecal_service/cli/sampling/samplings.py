@@ -158,7 +158,9 @@ def _lead(service: RestClient, view: SamplingView, as_json: bool) -> None:
     )
     if view.takes and view.protocol != "second_wearing":
         hand = read(Take, service.get(f"/takes/{view.takes[0]}")).known_hand
-        out.print(f"Next: glovecal train --subject {view.subject}" + (f" --hand {hand}" if hand else ""))
+        by = "" if view.method == "lmc_gpr" else f" --method {view.method}"
+        whose = f" --hand {hand}" if hand else ""
+        out.print(f"Next: glovecal train --subject {view.subject}{whose}{by}")
     elif view.takes:
         named = " ".join(f"--take {take}" for take in view.takes)
         out.print(f"Next: glovecal quick-check --subject {view.subject} {named} --activate")

@@ -70,6 +70,7 @@ class SamplingView(Row):
     open: bool = Field(description="Until its takes are stored.")
     recordings: list[str]
     takes: list[str]
+    method: str = Field(description="Of the calibration that learns from its takes.")
     created_at: datetime
     updated_at: datetime
 

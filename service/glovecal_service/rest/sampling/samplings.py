@@ -14,7 +14,14 @@ from pydantic import Field, FiniteFloat
 
 from glovecal_models.hand.rotations import known_hand
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.sampling.catalogue import ROD_MM, Equipment, Order, ProtocolName, make_protocol
+from glovecal_models.sampling.catalogue import (
+    ROD_MM,
+    Equipment,
+    Order,
+    ProtocolName,
+    make_protocol,
+    method_for,
+)
 from glovecal_models.sampling.engine import SHOWN_S, TIMER_S, Event, NotNow, Sampling, begin_sampling
 from glovecal_models.sampling.guided.touch_watch import require_possible_touches
 from glovecal_models.sampling.limits import SAMPLING_LIMITS
@@ -233,6 +240,7 @@ def _view(record: SamplingRecord) -> SamplingView:
     return SamplingView(
         **own,
         protocol=state.protocol.name,
+        method=method_for(state.protocol.name),
         trigger=state.trigger,
         seed=state.protocol.seed,
         phase=state.phase,

@@ -15,7 +15,7 @@ from glovecal_service.rest.job.answer import Job, JobFacts
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.rest.sampling.answer import SamplingView
 from glovecal_service.rest.take.answer import Take
-from glovecal_service.studio.heading import act, heading, main_act
+from glovecal_service.studio.heading import act, goes_live, heading, main_act
 from glovecal_service.studio.job_watch import JobWatch
 from glovecal_service.studio.pages.take_view import TakeView
 from glovecal_service.studio.served_label import ServedLabel
@@ -51,7 +51,9 @@ class SamplingEnd:
             self._left_open()
             with ui.element("div").classes("capture-acts"):
                 if view.takes and view.protocol != SECOND_WEARING:
-                    main_act("Train a model", self._train, large=True)
+                    name = "Train a template" if view.method == "template" else "Train a model"
+                    main_act(name, self._train, large=True)
+                    self._live = goes_live()
                 ui.link("New sampling", "/capture?mode=sampling").classes("studio-link")
             self._watch = JobWatch(self._studio, self._trained)
             self._after = ui.element("div").classes("findings").props('aria-live="polite"')
@@ -72,7 +74,8 @@ class SamplingEnd:
     async def _train(self) -> None:
         with refusals(warn_long):
             worn = {"subject": self._view.subject, "layout": self._view.layout}
-            body = worn | {"hand": await self._hand()}
+            own = {"method": self._view.method, "activate": self._live.value}
+            body = worn | own | {"hand": await self._hand()}
             job = await self._studio.service.ask(JobFacts, "/models/train", body)
             self._watch.follow(job.id)
 
@@ -85,9 +88,15 @@ class SamplingEnd:
         if job.state != "done":
             return
         with self._after, ui.element("div"):
-            ServedLabel(self._studio, self._view.glove, read(Trained, job.result).model, "Trained")
+            found = read(Trained, job.result)
+            if found.active:
+                ServedLabel(self._studio, self._view.glove, found.model, "Trained")
+            else:
+                ui.label("Trained. Live poses do not come from it.").props('role="status"')
+                act("Use it live", partial(self._activate, found.model, "The trained model is active"))
             ui.link("See the hand live", "/live").classes("studio-link")
-            ui.link("See its error", "/models").classes("studio-link")
+            ui.link("Which effect is missing?", f"/diagnose?model={found.model}").classes("studio-link")
+            ui.link("See its error", f"/compare?models={found.model}").classes("studio-link")
 
     async def _check(self) -> None:
         """The active model learns the shift of this wearing; the child is served if that made it better."""
@@ -134,14 +143,17 @@ class SamplingEnd:
             for sentence in found.sentences:
                 ui.label(sentence)
             if not is_better:
-                act("Use the checked model", partial(self._activate, found.model))
+                act(
+                    "Use the checked model",
+                    partial(self._activate, found.model, "The checked model is active"),
+                )
             ui.link("See the hand live", "/live").classes("studio-link")
 
-    async def _activate(self, model: str) -> None:
+    async def _activate(self, model: str, what: str) -> None:
         with refusals():
             await self._studio.service.post(f"/models/{model}/activate")
             with self._after:
-                ServedLabel(self._studio, self._view.glove, model, "The checked model is active")
+                ServedLabel(self._studio, self._view.glove, model, what)
 
 
 class RecordedTakes:
