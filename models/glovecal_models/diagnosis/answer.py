@@ -194,6 +194,28 @@ class MissingEffects(AboutTakes):
         return next((item for item in self.candidates if named and item.effect == named.effect), None)
 
     @property
+    def about_candidates(self) -> list[str]:
+        """Why one that is significant is not in the confidence set, and which rows are not to be compared."""
+        told, named = [], self.named
+        if named is not None and self.tried is not None:
+            worse = [
+                item.effect
+                for item in self.candidates
+                if item.passes and item.effect not in named.confidence_set
+            ]
+            if worse:
+                told.append(
+                    f"Significant and not in the confidence set: {', '.join(worse)}. With {named.effect} "
+                    "significantly less of the error is left on the same rotations."
+                )
+        if len({frozenset(item.where) for item in self.candidates if item.where}) > 1:
+            told.append(
+                "Each row is of the sensors that read its own rotations; rows of other rotations are not to "
+                "be compared."
+            )
+        return told
+
+    @property
     def next_command(self) -> str:
         """The one command to run after it."""
         model, named = (self.model or "MODEL")[:SHORT], self.named
@@ -329,7 +351,11 @@ class MissingEffects(AboutTakes):
             learned = {named.effect: named.parameters}
             parts += [effect_block(name, learned.get(name), own.get(name)) for name in possible]
         others = [item.effect for item in self.candidates if item.effect not in possible]
-        tried = [*tried_parts(self.candidates), *effects_explained(others, own)] if self.candidates else []
+        tried = list[Part]()
+        if self.candidates:
+            about = self.about_candidates
+            tried = [*tried_parts(self.candidates), *([Lines(about)] if about else [])]
+            tried += effects_explained(others, own)
         heading = "The effect" if len(possible) == 1 else "The effects that are possible"
         return [Section(heading, parts), Section("What was tried", tried)]
 

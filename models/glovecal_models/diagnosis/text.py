@@ -60,7 +60,7 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences += [within_slip_sentence(item) for item in diagnosis.assessments if _is_within_slip(item)]
     if diagnosis.next_take is not None:
         sentences.append(diagnosis.next_take.sentence)
-    sentences.append(residual_sentence(diagnosis.residual, by_column=diagnosis.by_column))
+    sentences.append(residual_sentence(diagnosis.residual, None, diagnosis.by_column, diagnosis.actions))
     return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
 
 
@@ -192,12 +192,16 @@ def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
 
 
 def residual_sentence(
-    residual: UnexplainedResidual, is_noise: bool | None = None, by_column: Sequence[Action] = ()
+    residual: UnexplainedResidual,
+    is_noise: bool | None = None,
+    by_column: Sequence[Action] = (),
+    actions: Sequence[Action] = (),
 ) -> str:
     """Whether the residual is significant, and what it is associated with.
 
     ``is_noise``: whether every error that a reader sees beside it lies within its floor's interval; None: the
-    residual's own errors. ``by_column``: of an effect that is named by it, and so still in it.
+    residual's own errors. ``by_column``: of an effect that is named by it, and so still in it. ``actions``:
+    what its associations ask for; where an effect pays on a rotation, it is not said that none explains it.
     """
     obstacle = residual_obstacle(residual)
     if obstacle is not None:
@@ -213,6 +217,9 @@ def residual_sentence(
     start = f"No {known} explains {_rest(residual)}"
     if by_column:
         start = f"Until {by_column[0].effect} is added, its error is in the residual"
+    elif paying := [item for item in actions if item.saves and item.is_physical and not item.is_within_known]:
+        first = paying[0]
+        start = f"On {first.rotation} {first.effect} explains a part of {_rest(residual)}"
     sentence = f"{start}: {' and '.join(parts)}; {_associated(residual.associations)}.{_unsettled(residual)}"
     undecided = " or ".join(residual.undecided)
     return (
@@ -265,12 +272,15 @@ def _above_floor(name: str, item: FloorRatio) -> str:
 
 
 def unexplained(
-    found: UnexplainedResidual, is_noise: bool | None = None, by_column: Sequence[Action] = ()
+    found: UnexplainedResidual,
+    is_noise: bool | None = None,
+    by_column: Sequence[Action] = (),
+    actions: Sequence[Action] = (),
 ) -> Unexplained:
     """As answers tell it. ``is_noise``: of the errors shown beside it; None: the residual's own."""
     return Unexplained(
         found.is_significant,
-        residual_sentence(found, is_noise, by_column),
+        residual_sentence(found, is_noise, by_column, actions),
         residual_obstacle(found),
         [
             AssociatedColumn(item.rotation, item.column, item.phrase, item.size_deg, item.p_value)
@@ -343,7 +353,7 @@ def missing_effects(diagnosis: Diagnosis) -> MissingEffects:
         named=None if named is None else replace(named, sentence=named_sentence(diagnosis) or ""),
         candidates=[candidate(item) for item in diagnosis.ranked_assessments],
         not_identifiable=[NotShown(item.effect, item.why) for item in diagnosis.not_identifiable],
-        unexplained_residual=unexplained(diagnosis.residual, by_column=diagnosis.by_column),
+        unexplained_residual=unexplained(diagnosis.residual, None, diagnosis.by_column, diagnosis.actions),
         next_take=diagnosis.next_take,
         sentences=diagnosis_sentences(diagnosis),
         findings=[

@@ -131,7 +131,7 @@ def _closing_sentences(diagnosis: Diagnosis, improvement: Improvement) -> list[s
     if held is None and not diagnosis.findings and not diagnosis.naming.ranked:
         sentences.append(nothing_named_sentence(diagnosis))
     sentences += not_identifiable_sentences(diagnosis.not_identifiable)
-    sentences.append(residual_sentence(diagnosis.residual, is_noise(improvement)))
+    sentences.append(residual_sentence(diagnosis.residual, is_noise(improvement), actions=diagnosis.actions))
     if diagnosis.residual.is_significant:
         sentences += not_left_to_gain(improvement.ceiling)
     if held is None:
@@ -206,7 +206,9 @@ def improved(found: Improvement) -> Improved:
         noise_floor_interval_deg={name: [floor.low_deg, floor.high_deg] for name, floor in floors.items()},
         noise_floors=floors,
         hold_drift=None if held is None else drift_in_holds(held),
-        unexplained_residual=None if last is None else unexplained(last.residual, is_noise(found)),
+        unexplained_residual=None if last is None else unexplained(
+            last.residual, is_noise(found), actions=last.actions
+        ),
         ceiling=None if found.ceiling is None else left_to_gain(found.ceiling),
         method=found.models[0].method,
         subject=found.models[0].subject,

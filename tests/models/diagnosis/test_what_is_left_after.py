@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS
+from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.diagnosis.text import diagnosis_sentences, residual_sentence
+from glovecal_models.effects.base.assessment import HeldOutRmse
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -84,6 +87,20 @@ def test_effects_that_forget_at_once_leave_all_to_be_judged(healthy):
     found = left_of(takes, PULL).residual
     assert found.is_significant
     assert residual_sentence(found).startswith("No known effect explains what is left after cross_coupling: ")
+
+
+def test_it_is_not_said_that_nothing_explains_what_an_effect_pays_on(healthy):
+    found = left_of(read_as(healthy, from_before(healthy)), PULL).residual
+    wearing = ResidualAssociation("I_PIP", "wearing", "the wearing", 2.0, 0.001)
+    pays = Action(wearing, "donning_shift", rmse_deg=HeldOutRmse(3.0, 2.0, 3.1))
+    assert residual_sentence(found, actions=[pays]).startswith(
+        "On I_PIP donning_shift explains a part of what is left after cross_coupling: "
+    )
+    for no_help in (
+        replace(pays, rmse_deg=HeldOutRmse(3.0, 2.9, 2.8)),
+        replace(pays, is_of_known=True),
+    ):
+        assert residual_sentence(found, actions=[no_help]) == residual_sentence(found)
 
 
 def warmed(takes: Sequence[Take], counts: float) -> list[Take]:

@@ -135,6 +135,8 @@ class DiagnosePage:
                 heading(2, "Smoothed error with each effect")
                 candidate_table(found.candidates[:SHOWN_CANDIDATES])
                 bar_key()
+                for sentence in found.about_candidates:
+                    ui.label(sentence)
         self._recorded(found)
         self._remains(found)
         following = found.next_take
