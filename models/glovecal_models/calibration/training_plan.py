@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from glovecal_models.calibration.chosen_inputs import with_chosen_inputs
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes, usable_folds, wearing_groups
 from glovecal_models.calibration.samples import (
@@ -130,7 +131,7 @@ def plan_training(
     usable = usable_sensors(layout, takes)
     if settings.keep_dead:
         usable = UsableSensors(layout, (), ())
-    layout = usable.layout
+    layout = with_chosen_inputs(usable.layout, takes)
     tasks: list[FitTask] = []
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}

@@ -1,18 +1,18 @@
-"""Files dropped on any page: tables go to the page Takes, models are imported."""
+"""Files dropped on any page: what they are is shown on the page Takes; models are imported at once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from urllib.parse import quote, unquote
 
 from nicegui import events, ui
 
 from glovecal_service.plain import read
 from glovecal_service.rest.model.answer import ImportedModel
-from glovecal_service.rest.take.answer import UploadedFile
+from glovecal_service.rest.take.answer import UploadedFile, UploadKind
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
-OF_MODELS = ".safetensors"
 MOST_AT_ONCE = 200
 KEPT_AS = "application/octet-stream"
 
@@ -21,7 +21,7 @@ Uploaded = tuple[str, str]
 
 
 def address_of(files: list[Uploaded]) -> str:
-    """Of the page that shows what these tables are."""
+    """Of the page that shows what these files are."""
     return "/takes?files=" + quote(",".join(f"{sha}:{quote(name, safe='')}" for sha, name in files))
 
 
@@ -32,11 +32,13 @@ def files_of(query: str) -> list[Uploaded]:
 
 
 class DropZone:
-    """The whole page takes files, from a drop or from ``button``. Tables are shown on the page Takes; what
-    becomes of models, and refusals, are notices."""
+    """The whole page takes files, from a drop or from ``button``. What they are is shown on the page Takes;
+    what becomes of models, and refusals, are notices."""
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
+        self.waiting: Sequence[Uploaded] = ()
+        """Files that the page shows and that nobody imported yet: what comes next is shown with them."""
         # The library's own field has no name for those who hear the page; a button or a drop fills it.
         with ui.element("div").classes("capture-upload"):
             self._field = ui.upload(
@@ -60,19 +62,20 @@ class DropZone:
 
     async def _received(self, event: events.MultiUploadEventArguments) -> None:
         self._field.reset()
-        tables: list[Uploaded] = []
+        service = self._studio.service
+        shown: list[Uploaded] = []
         for file in event.files:
             content = await file.read()
             try:
-                if file.name.lower().endswith(OF_MODELS):
+                kept = read(UploadedFile, await service.post_file("/uploads", content, KEPT_AS))
+                if (await service.read(UploadKind, f"/uploads/{kept.sha256}/kind")).kind == "model":
                     await self._import_model(file.name, content)
                 else:
-                    kept = await self._studio.service.post_file("/uploads", content, KEPT_AS)
-                    tables.append((read(UploadedFile, kept).sha256, file.name))
+                    shown.append((kept.sha256, file.name))
             except Refusal as refusal:
                 ui.notify(f"{file.name}: {refusal}", type="warning", timeout=10_000)
-        if tables:
-            ui.navigate.to(address_of(tables))
+        if shown:
+            ui.navigate.to(address_of(list(dict.fromkeys([*self.waiting, *shown]))))
 
     async def _import_model(self, name: str, content: bytes) -> None:
         kept = await self._studio.service.post_file("/models/import", content, KEPT_AS, create_subject=True)
