@@ -7,7 +7,7 @@ the error of a quadratic map on left-out takes, for as long as one more is worth
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,30 +24,28 @@ MOST_TRIED = 16
 WORTHWHILE = 0.02
 """Share of the left-out error that one more sensor has to take away."""
 FOLDS = 3
+FEWEST_SAMPLES = 300
+"""With fewer the map of a sensor that tells nothing can win."""
 MOST_ROWS = 6000
 RIDGE = 1e-6
 """Of a feature's variance."""
 
 
-def with_chosen_inputs(layout: Layout, takes: Sequence[Take]) -> Layout:
-    """The layout in which rotations that are read from every sensor are read from those that explain them.
+def with_chosen_inputs(layout: Layout, unsaid: Collection[str], takes: Sequence[Take]) -> Layout:
+    """The layout in which the rotations ``unsaid`` are read from those of their sensors that explain them.
     Deterministic: the same takes give the same sensors."""
-    return replace(
-        layout,
-        correspondences=tuple(
-            _chosen(item, takes) if set(item.sensors) == set(layout.sensors) and _is_open(item) else item
-            for item in layout.correspondences
-        ),
+    chosen = tuple(
+        _chosen(item, takes)
+        if item.rotation in unsaid and item.kind == "MS1R" and len(item.sensors) >= FEWEST_TO_CHOOSE
+        else item
+        for item in layout.correspondences
     )
-
-
-def _is_open(item: Correspondence) -> bool:
-    return item.kind == "MS1R" and len(item.sensors) >= FEWEST_TO_CHOOSE and item.rotation not in item.sensors
+    return layout if chosen == layout.correspondences else replace(layout, correspondences=chosen)
 
 
 def _chosen(item: Correspondence, takes: Sequence[Take]) -> Correspondence:
     samples = gather_samples(takes, item)
-    if len(samples) < FOLDS or np.ptp(samples.target) == 0:
+    if len(samples) < FEWEST_SAMPLES or np.ptp(samples.target) == 0:
         return item
     error = _LeftOutError.of(samples)
     alone = {sensor: error.of_sensors([sensor]) for sensor in range(len(item.sensors))}

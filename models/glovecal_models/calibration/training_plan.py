@@ -52,7 +52,8 @@ class UsableSensors:
     """What is left of a layout. The glove still sends all its sensors: only what is read of them changes."""
 
     layout: Layout
-    """The same sensors; rotations are read from those that live."""
+    """The same sensors; rotations are read from those that live, and where nobody said which from those that
+    explain them (``chosen_inputs``)."""
     dead: tuple[DeadSensor, ...]
     """Of the sensors that some rotation was read from."""
     unreadable: tuple[str, ...]
@@ -68,8 +69,10 @@ def usable_sensors(layout: Layout, takes: Sequence[Take]) -> UsableSensors:
     reduced = [_reduced(item, dead) for item in layout.correspondences]
     read = {name for item in layout.correspondences for name in item.sensors}
     kept = (now or before for now, before in zip(reduced, layout.correspondences, strict=True))
+    living = replace(layout, correspondences=tuple(kept)) if dead & read else layout
+    unsaid = [item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)]
     return UsableSensors(
-        replace(layout, correspondences=tuple(kept)) if dead & read else layout,
+        with_chosen_inputs(living, unsaid, takes),
         tuple(item for item in found if item.sensor in read),
         tuple(name for name, now in zip(layout.rotations, reduced, strict=True) if now is None),
     )
@@ -131,7 +134,7 @@ def plan_training(
     usable = usable_sensors(layout, takes)
     if settings.keep_dead:
         usable = UsableSensors(layout, (), ())
-    layout = with_chosen_inputs(usable.layout, takes)
+    layout = usable.layout
     tasks: list[FitTask] = []
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}

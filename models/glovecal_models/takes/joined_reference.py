@@ -13,6 +13,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.clock_scan import (
+    BETTER_THAN_REVERSED,
     LEAST_OVERLAP,
     ClockOffset,
     clock_offsets,
@@ -47,32 +48,42 @@ class JoinedReference:
     sentence: str
 
 
-def join_reference(take: Take, rows: ReferenceRows, offset_s: float | None = None) -> JoinedReference:
-    """``offset_s``: reference time less frame time, where it is known. Raises BadInput where not a row lies
-    within the take."""
+def with_reference(take: Take, rows: ReferenceRows, offset_s: float) -> Take:
+    """``offset_s``: reference time less frame time. Raises BadInput where not a row lies within the take."""
+    found = _with(take, rows, offset_s)
+    time_s = found.reference_time_s
+    if not ((time_s >= take.start_s) & (time_s <= take.time_s[-1])).any():
+        raise BadInput(
+            f"no row of the reference lies within take {take.name!r}: on its clock it counts from "
+            f"{time_s[0]:.1f} to {time_s[-1]:.1f} s, the take from {take.time_s[0]:.1f} to "
+            f"{take.time_s[-1]:.1f} s; choose another take"
+        )
+    return found
+
+
+def join_reference(take: Take, rows: ReferenceRows) -> JoinedReference:
+    """The reference where movement puts it; where that does not tell, by the time that both count, or else
+    both begin at once."""
     first, last = float(rows.time_s[0]), float(rows.time_s[-1])
     together = min(last, take.time_s[-1]) - max(first, take.time_s[0])
     shares = together > SAME_CLOCK_OVERLAP * min(last - first, take.duration_s)
-    start = offset_s if offset_s is not None else 0.0 if shares else first - float(take.time_s[0])
-    begun = _with(take, rows, start)
-    moved = _filled(begun)
-    if offset_s is None and not shares:
-        start += _widest(moved)
-        begun = _with(take, rows, start)
-        moved = _filled(begun)
-    [clock] = clock_offsets([moved])
-    if offset_s is None and clock.verdict == "offset":
+    start = 0.0 if shares else first - float(take.time_s[0])
+    clock = _clock(take, rows, start)
+    if not _is_found(clock):  # the same seconds may have been counted from two moments
+        widely = start + _widest(_filled(_with(take, rows, start)))
+        elsewhere = _clock(take, rows, widely)
+        if _is_found(elsewhere):
+            start, shares, clock = widely, False, elsewhere
+    if clock.verdict == "offset":
         start += clock.offset_s
-        begun = _with(take, rows, start)
-    inside = (begun.reference_time_s >= take.start_s) & (begun.reference_time_s <= take.time_s[-1])
-    if not inside.any():
-        raise BadInput(
-            f"no row of the reference lies within take {take.name!r}: it counts from {first:.1f} to "
-            f"{last:.1f} s, the take from {take.time_s[0]:.1f} to {take.time_s[-1]:.1f} s; choose another one"
-        )
-    found = clock.verdict in ("offset", "agrees")
-    left = clock.unexplained_after if found else 1.0
-    return JoinedReference(begun, start, found, left, _sentence(take, rows, start, clock, shares))
+    found = _is_found(clock)
+    return JoinedReference(
+        with_reference(take, rows, start),
+        start,
+        found,
+        clock.unexplained_after if found else 1.0,
+        _sentence(take, rows, start, clock, shares),
+    )
 
 
 def join_references(takes: Sequence[Take], references: Sequence[ReferencesByTake]) -> list[JoinedReference]:
@@ -104,6 +115,14 @@ def best_of(takes: Sequence[Take], references: Sequence[ReferenceRows]) -> list[
     return sorted(found, key=lambda each: (not each.is_found, each.unexplained))
 
 
+def _clock(take: Take, rows: ReferenceRows, offset_s: float) -> ClockOffset:
+    return clock_offsets([_filled(_with(take, rows, offset_s))])[0]
+
+
+def _is_found(clock: ClockOffset) -> bool:
+    return clock.verdict in ("offset", "agrees")
+
+
 def _with(take: Take, rows: ReferenceRows, offset_s: float) -> Take:
     return replace(
         take, rotations=rows.rotations, reference_time_s=rows.time_s - offset_s, reference=rows.reference,
@@ -122,7 +141,8 @@ def _filled(take: Take) -> Take:
 
 
 def _widest(take: Take) -> float:
-    """The offset with the best fit, of all at which both overlap enough, in steps of a tenth of a second."""
+    """The offset with the best fit, of all at which both overlap enough, in steps of a tenth of a second.
+    0 where readings played backwards fit nearly as well."""
     grid = on_grid(take)
     if grid is None:
         return 0.0
@@ -131,12 +151,19 @@ def _widest(take: Take) -> float:
     low = float(take.reference_time_s[0] + least - take.time_s[-1])
     high = float(take.reference_time_s[-1] - least - take.time_s[0])
     steps = np.arange(low, high + WIDE_STEP_S, max(WIDE_STEP_S, (high - low) / MOST_STEPS))
-    left = np.array([unexplained(grid, grid.readings, grid.time_s + step) for step in steps])
-    return float(steps[np.nanargmin(left)]) if np.isfinite(left).any() else 0.0
+    left, backwards = (
+        np.array([unexplained(grid, readings, grid.time_s + step) for step in steps])
+        for readings in (grid.readings, grid.readings[::-1])
+    )
+    if not (np.isfinite(left) & np.isfinite(backwards)).any():
+        return 0.0
+    if np.nanmin(left) > BETTER_THAN_REVERSED * np.nanmin(backwards):
+        return 0.0
+    return float(steps[np.nanargmin(left)])
 
 
 def _sentence(take: Take, rows: ReferenceRows, offset_s: float, clock: ClockOffset, shares: bool) -> str:
-    if clock.verdict not in ("offset", "agrees"):
+    if not _is_found(clock):
         both = "both count the same time" if shares else "both are taken to begin at once"
         return f"Movement does not tell whether it belongs to take {take.name}; {both}."
     explained = 100 * (1.0 - clock.unexplained_after)

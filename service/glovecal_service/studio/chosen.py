@@ -37,9 +37,9 @@ class Chosen:
         """Whether the model is of a simulated hand, which nobody's own takes belong to."""
         return self.model is not None and bool(self.model.facts.get("simulated"))
 
-    def address(self, page: str) -> str:
-        """Of another page about the same."""
-        kept = {"who": self.person, "model": self.model.short if self.model else ""}
+    def address(self, page: str, **more: str) -> str:
+        """Of another page about the same, and ``more`` that it is told."""
+        kept = {"who": self.person, "model": self.model.short if self.model else "", **more}
         query = urlencode({name: value for name, value in kept.items() if value})
         return f"/{page}?{query}" if query else f"/{page}"
 

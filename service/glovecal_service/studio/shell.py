@@ -48,6 +48,7 @@ class Around:
     drop: DropZone
     chosen: Chosen
     _header: Header
+    _line: NextStepLine
 
     async def model(self, service: Service) -> Model | None:
         """The one that is chosen; where there is none, what to do next is shown."""
@@ -57,10 +58,12 @@ class Around:
             await next_steps(service, self.chosen)
         return self.chosen.model
 
-    def is_now_about(self, person: str) -> None:
-        """Whose takes or model just came in stands in the header, in its links, and in the address."""
+    async def is_now_about(self, person: str) -> None:
+        """Whose takes or model just came in stands in the header, in its links, in the address, and in the next step."""
+        about = self.chosen.of_person(person)
         with self._header.place:  # whoever says it may stand in a place that is gone
-            self._header.show(self.chosen.of_person(person))
+            self._header.show(about)
+        await self._line.look(about)
 
 
 class Header:
@@ -120,7 +123,7 @@ async def shell(
             ui.label(about.notice).classes("studio-notice").props('role="status"')
         line = NextStepLine(studio.service, about, here)
         await line.look()
-        yield Around(DropZone(studio), about, header)
+        yield Around(DropZone(studio, about), about, header, line)
     drawer.start(line.look)
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, FiniteFloat
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.angles_on_a_circle import unwrapped
-from glovecal_models.takes.joined_reference import ReferencesByTake, join_reference
+from glovecal_models.takes.joined_reference import ReferencesByTake, join_reference, with_reference
 from glovecal_service.request_types import ID, SubjectName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import change_problems
@@ -79,7 +79,11 @@ def attach_reference(body: AttachedReference, parts: PartsNeeded) -> TakeRecord:
     found = read_uploaded(parts, body, record.known_hand or _hand_of_subject(parts, record.subject))
     rows = found.rows.get(record.name) or found.rows.get(None) or next(iter(found.rows.values()))
     take = parts.store.takes.load(record.id)
-    joined = join_reference(take, rows, body.offset_s).take
+    joined = (
+        join_reference(take, rows).take
+        if body.offset_s is None
+        else with_reference(take, rows, body.offset_s)
+    )
     circle = unwrapped([joined])
     [took] = circle.takes
     return parts.store.takes.attach_reference(

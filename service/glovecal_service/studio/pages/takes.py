@@ -10,7 +10,7 @@ from nicegui import ui
 
 from glovecal_models.takes.answer import TablePreview
 from glovecal_service.rest.take.answer import CardTable, Take, UploadKind
-from glovecal_service.studio.drop import Uploaded, files_of
+from glovecal_service.studio.drop import Uploaded, files_of, imported_model
 from glovecal_service.studio.pages.dropped_calibration import DroppedCalibration
 from glovecal_service.studio.pages.dropped_reference import DroppedReference
 from glovecal_service.studio.pages.dropped_tables import FilesOfOneShape, uploaded
@@ -67,6 +67,9 @@ class TakesPage:
                     match (await self._studio.service.read(UploadKind, f"/uploads/{file[0]}/kind")).kind:
                         case "calibration":
                             await DroppedCalibration(self._studio, file, self._imported_model).build(about)
+                        case "model":
+                            sentence = await imported_model(self._studio.service, file)
+                            ui.label(sentence).classes("finding-sentence").props('role="status"')
                         case "motion":
                             references.append(DroppedReference(self._studio, file, self._attached))
                         case "card":
