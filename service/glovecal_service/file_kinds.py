@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from glovecal_client.capture.cyberglove3.card import card_layout
-from glovecal_service.motion_files import formats as motion_files
+from glovecal_service.exports.motion_files import formats as motion_files
 from glovecal_service.vendor_calibrations import formats as vendor_calibrations
 
 FileKind = Literal["model", "calibration", "motion", "card", "table"]

@@ -36,7 +36,7 @@ def later(rows: ReferenceRows, by_s: float, from_row: int = 0) -> ReferenceRows:
 def test_the_offset_is_found_whatever_both_count(begun_s: float, late_rows: int, clock_s: float) -> None:
     take, rows = recorded(3, from_s=begun_s)
     found = join_reference(take, later(rows, clock_s, late_rows))
-    assert found.is_found
+    assert found.is_matched
     assert found.offset_s == pytest.approx(clock_s, abs=LAG_S)
     assert found.unexplained < 0.15
 
@@ -66,16 +66,16 @@ def test_each_take_gets_the_reference_that_fits_it() -> None:
     assert [each.offset_s for each in found] == pytest.approx([0.0, 50.0, 100.0, 150.0], abs=LAG_S)
     best, *others = best_of(takes, [moved[2]])
     assert best.take.name == "t2"
-    assert not any(each.is_found for each in others)
+    assert not any(each.is_matched for each in others)
 
 
 def test_what_movement_does_not_tell_is_said() -> None:
     take, _ = recorded(6)
     _, rows = recorded(7)
     found = join_reference(take, rows)
-    assert not found.is_found
+    assert not found.is_matched
     assert found.sentence == (
-        "Movement does not tell whether it belongs to take t6; both count the same time."
+        "Movement does not tell whether it belongs to take t6; both are taken to count the same time."
     )
     with pytest.raises(BadInput, match="no row of the reference lies within take 't6'"):
         with_reference(take, rows, 900.0)

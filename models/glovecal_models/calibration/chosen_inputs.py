@@ -21,22 +21,22 @@ FEWEST_TO_CHOOSE = 4
 """Sensors; a process over fewer is fast enough to be given all."""
 MOST_TRIED = 16
 """Sensors beside one another: those that explain most by themselves."""
-WORTHWHILE = 0.02
+WORTH_ONE_MORE = 0.02
 """Share of the left-out error that one more sensor has to take away."""
 FOLDS = 3
-FEWEST_SAMPLES = 300
+FEWEST_FOR_A_CHOICE = 300
 """With fewer the map of a sensor that tells nothing can win."""
 MOST_ROWS = 6000
 RIDGE = 1e-6
 """Of a feature's variance."""
 
 
-def with_chosen_inputs(layout: Layout, unsaid: Collection[str], takes: Sequence[Take]) -> Layout:
-    """The layout in which the rotations ``unsaid`` are read from those of their sensors that explain them.
-    Deterministic: the same takes give the same sensors."""
+def with_chosen_inputs(layout: Layout, unassigned: Collection[str], takes: Sequence[Take]) -> Layout:
+    """The layout in which rotations that are ``unassigned`` are read from those of their sensors that explain
+    them. Deterministic: the same takes give the same sensors."""
     chosen = tuple(
         _chosen(item, takes)
-        if item.rotation in unsaid and item.kind == "MS1R" and len(item.sensors) >= FEWEST_TO_CHOOSE
+        if item.rotation in unassigned and item.kind == "MS1R" and len(item.sensors) >= FEWEST_TO_CHOOSE
         else item
         for item in layout.correspondences
     )
@@ -45,7 +45,7 @@ def with_chosen_inputs(layout: Layout, unsaid: Collection[str], takes: Sequence[
 
 def _chosen(item: Correspondence, takes: Sequence[Take]) -> Correspondence:
     samples = gather_samples(takes, item)
-    if len(samples) < FEWEST_SAMPLES or np.ptp(samples.target) == 0:
+    if len(samples) < FEWEST_FOR_A_CHOICE or np.ptp(samples.target) == 0:
         return item
     error = _LeftOutError.of(samples)
     alone = {sensor: error.of_sensors([sensor]) for sensor in range(len(item.sensors))}
@@ -54,7 +54,7 @@ def _chosen(item: Correspondence, takes: Sequence[Take]) -> Correspondence:
     while len(kept) < len(tried):
         more = {sensor: error.of_sensors([*kept, sensor]) for sensor in tried if sensor not in kept}
         best = min(more, key=lambda sensor: (more[sensor], sensor))
-        if more[best] > (1.0 - WORTHWHILE) ** 2 * left:
+        if more[best] > (1.0 - WORTH_ONE_MORE) ** 2 * left:
             break
         kept, left = [*kept, best], more[best]
     names = tuple(name for at, name in enumerate(item.sensors) if at in kept)

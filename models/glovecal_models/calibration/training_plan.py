@@ -70,9 +70,11 @@ def usable_sensors(layout: Layout, takes: Sequence[Take]) -> UsableSensors:
     read = {name for item in layout.correspondences for name in item.sensors}
     kept = (now or before for now, before in zip(reduced, layout.correspondences, strict=True))
     living = replace(layout, correspondences=tuple(kept)) if dead & read else layout
-    unsaid = [item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)]
+    unassigned = [
+        item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)
+    ]
     return UsableSensors(
-        with_chosen_inputs(living, unsaid, takes),
+        with_chosen_inputs(living, unassigned, takes),
         tuple(item for item in found if item.sensor in read),
         tuple(name for name, now in zip(layout.rotations, reduced, strict=True) if now is None),
     )

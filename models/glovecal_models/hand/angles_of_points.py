@@ -49,13 +49,13 @@ def named_points(names: Sequence[str]) -> dict[str, NamedPoint]:
     those that mean nothing of a hand are left out."""
     words = {name: _words(name) for name in names}
     has_metacarpal_thumb = any("thumb" in each and "metacarpal" in each for each in words.values())
-    found = {}
+    points = {}
     for name, each in words.items():
-        said: list[Handedness] = [SIDES[word] for word in each if word in SIDES]
+        hands: list[Handedness] = [SIDES[word] for word in each if word in SIDES]
         joint = _joint([word for word in each if word not in SIDES], has_metacarpal_thumb)
         if joint:
-            found[name] = NamedPoint(said[0] if said else None, joint)
-    return found
+            points[name] = NamedPoint(hands[0] if hands else None, joint)
+    return points
 
 
 def _words(name: str) -> list[str]:
@@ -70,17 +70,17 @@ def _joint(words: Sequence[str], has_metacarpal_thumb: bool) -> str:
             return "WRIST"
         return "ELBOW" if "elbow" in words or list(words) in (["fore", "arm"], ["forearm"]) else ""
     finger, rest = FINGER_OF[words[at]], words[at + 1 :]
-    said = next((PLACE_OF[word] for word in rest if word in PLACE_OF), "")
+    place = next((PLACE_OF[word] for word in rest if word in PLACE_OF), "")
     numbers = [int(word) for word in rest if word.isdigit() and len(word) < 3]
-    if not said and len(numbers) == 1 and 1 <= numbers[0] <= len(CHAIN[finger]):
-        said = CHAIN[finger][numbers[0] - 1]
+    if not place and len(numbers) == 1 and 1 <= numbers[0] <= len(CHAIN[finger]):
+        place = CHAIN[finger][numbers[0] - 1]
     if finger == "T":
-        said = {"DIP": "IP", "PIP": "MCP"}.get(said, said)
+        place = {"DIP": "IP", "PIP": "MCP"}.get(place, place)
         if "proximal" in rest and not has_metacarpal_thumb:
-            said = "CMC"  # where no bone is called the metacarpal, it is the first of three
-    elif said == "CMC":
+            place = "CMC"  # where no bone is called the metacarpal, it is the first of three
+    elif place == "CMC":
         return ""
-    return f"{finger}_{said}" if said in CHAIN[finger] else ""
+    return f"{finger}_{place}" if place in CHAIN[finger] else ""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class HandAngles:
 
 def angles_of_points(places: Mapping[str, np.ndarray], hand: Handedness) -> HandAngles:
     """``places``: (N, 3) by joint, of one unit, NaN where it was not seen."""
-    found: dict[str, np.ndarray] = {}
+    angles: dict[str, np.ndarray] = {}
     made_of: dict[str, tuple[str, ...]] = {}
     left_out: dict[str, str] = {}
 
@@ -107,7 +107,7 @@ def angles_of_points(places: Mapping[str, np.ndarray], hand: Handedness) -> Hand
         if missing:
             left_out[rotation] = f"no point {', '.join(missing)}"
         else:
-            found[rotation], made_of[rotation] = angle(*(places[name] for name in needed)), tuple(needed)
+            angles[rotation], made_of[rotation] = angle(*(places[name] for name in needed)), tuple(needed)
 
     palm = _palm(places, hand)
     for finger in FINGERS:
@@ -125,8 +125,8 @@ def angles_of_points(places: Mapping[str, np.ndarray], hand: Handedness) -> Hand
             tell(rotation, needed, partial(_spread, palm))
         for rotation, turn in WRIST_TURNS.items():
             tell(rotation, ("ELBOW", "WRIST"), partial(turn, palm))
-    moving = {name: values for name, values in found.items() if np.isfinite(values).any()}
-    left_out |= dict.fromkeys(set(found) - set(moving), "its points are never seen together")
+    moving = {name: values for name, values in angles.items() if np.isfinite(values).any()}
+    left_out |= dict.fromkeys(set(angles) - set(moving), "its points are never seen together")
     count = len(next(iter(places.values()))) if places else 0
     degrees = np.column_stack(list(moving.values())) if moving else np.empty((count, 0))
     return HandAngles(tuple(moving), degrees, {name: made_of[name] for name in moving}, left_out)

@@ -41,7 +41,7 @@ class JoinedReference:
     take: Take
     offset_s: float
     """Reference time = frame time + offset."""
-    is_found: bool
+    is_matched: bool
     """Whether movement tells that it belongs here, and when."""
     unexplained: float
     """Share of the angles' variance that no linear map of the readings explains; 1 where nobody can say."""
@@ -50,15 +50,15 @@ class JoinedReference:
 
 def with_reference(take: Take, rows: ReferenceRows, offset_s: float) -> Take:
     """``offset_s``: reference time less frame time. Raises BadInput where not a row lies within the take."""
-    found = _with(take, rows, offset_s)
-    time_s = found.reference_time_s
+    whole = _with(take, rows, offset_s)
+    time_s = whole.reference_time_s
     if not ((time_s >= take.start_s) & (time_s <= take.time_s[-1])).any():
         raise BadInput(
             f"no row of the reference lies within take {take.name!r}: on its clock it counts from "
             f"{time_s[0]:.1f} to {time_s[-1]:.1f} s, the take from {take.time_s[0]:.1f} to "
             f"{take.time_s[-1]:.1f} s; choose another take"
         )
-    return found
+    return whole
 
 
 def join_reference(take: Take, rows: ReferenceRows) -> JoinedReference:
@@ -69,19 +69,19 @@ def join_reference(take: Take, rows: ReferenceRows) -> JoinedReference:
     shares = together > SAME_CLOCK_OVERLAP * min(last - first, take.duration_s)
     start = 0.0 if shares else first - float(take.time_s[0])
     clock = _clock(take, rows, start)
-    if not _is_found(clock):  # the same seconds may have been counted from two moments
+    if not _is_matched(clock):  # the same seconds may have been counted from two moments
         widely = start + _widest(_filled(_with(take, rows, start)))
         elsewhere = _clock(take, rows, widely)
-        if _is_found(elsewhere):
+        if _is_matched(elsewhere):
             start, shares, clock = widely, False, elsewhere
     if clock.verdict == "offset":
         start += clock.offset_s
-    found = _is_found(clock)
+    is_matched = _is_matched(clock)
     return JoinedReference(
         with_reference(take, rows, start),
         start,
-        found,
-        clock.unexplained_after if found else 1.0,
+        is_matched,
+        clock.unexplained_after if is_matched else 1.0,
         _sentence(take, rows, start, clock, shares),
     )
 
@@ -89,7 +89,7 @@ def join_reference(take: Take, rows: ReferenceRows) -> JoinedReference:
 def join_references(takes: Sequence[Take], references: Sequence[ReferencesByTake]) -> list[JoinedReference]:
     """Each take with the reference that names it, else with the one that fits best. Raises BadInput where
     there is none for a take."""
-    found = []
+    joined = []
     for take in takes:
         named = [each[take.name] for each in references if take.name in each]
         others = [rows for each in references for name, rows in each.items() if name is None]
@@ -97,29 +97,32 @@ def join_references(takes: Sequence[Take], references: Sequence[ReferencesByTake
             others = list(references[0].values())
         if not named and not others:
             raise BadInput(f"no reference holds rows for take {take.name!r}; name it in the column take")
-        found.append(best_of([take], named or others)[0])
-    return found
+        joined.append(best_of([take], named or others)[0])
+    return joined
 
 
 def best_of(takes: Sequence[Take], references: Sequence[ReferenceRows]) -> list[JoinedReference]:
     """Every pair that has a moment in common, the best first. Raises BadInput where there is none."""
-    found, refused = [], BadInput("there is no take that the reference could belong to; record or import one")
+    joined, refused = (
+        [],
+        BadInput("there is no take that the reference could belong to; record or import one"),
+    )
     for take in takes:
         for rows in references:
             try:
-                found.append(join_reference(take, rows))
+                joined.append(join_reference(take, rows))
             except BadInput as error:
                 refused = error
-    if not found:
+    if not joined:
         raise refused
-    return sorted(found, key=lambda each: (not each.is_found, each.unexplained))
+    return sorted(joined, key=lambda each: (not each.is_matched, each.unexplained))
 
 
 def _clock(take: Take, rows: ReferenceRows, offset_s: float) -> ClockOffset:
     return clock_offsets([_filled(_with(take, rows, offset_s))])[0]
 
 
-def _is_found(clock: ClockOffset) -> bool:
+def _is_matched(clock: ClockOffset) -> bool:
     return clock.verdict in ("offset", "agrees")
 
 
@@ -163,8 +166,8 @@ def _widest(take: Take) -> float:
 
 
 def _sentence(take: Take, rows: ReferenceRows, offset_s: float, clock: ClockOffset, shares: bool) -> str:
-    if not _is_found(clock):
-        both = "both count the same time" if shares else "both are taken to begin at once"
+    if not _is_matched(clock):
+        both = "both are taken to count the same time" if shares else "both are taken to begin at once"
         return f"Movement does not tell whether it belongs to take {take.name}; {both}."
     explained = 100 * (1.0 - clock.unexplained_after)
     begins = float(rows.time_s[0]) - offset_s - float(take.time_s[0])

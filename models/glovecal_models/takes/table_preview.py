@@ -46,10 +46,10 @@ def preview_table(
             problem, takes = str(error), []
         else:
             takes = [each.take for each in joined]
-    told = [each.sentence for each in joined]
+    how_joined = [each.sentence for each in joined]
     return TablePreview(
         path.name, is_own, as_before is not None, shown, equal_times, [_of_take(take) for take in takes],
-        _first(path, shown), [*told, *take_warnings(takes)], problem,
+        _first(path, shown), [*how_joined, *take_warnings(takes)], problem,
     )  # fmt: skip
 
 

@@ -69,14 +69,14 @@ class DropZone:
         sent: list[Uploaded] = []
         kinds: list[str] = []
         for file in event.files:
-            with refusals(partial(_told_of, file.name)):
+            with refusals(partial(_warn_of, file.name)):
                 answer = await service.post_file("/uploads", await file.read(), KEPT_AS)
                 kept = read(UploadedFile, answer)
                 kinds.append((await service.read(UploadKind, f"/uploads/{kept.sha256}/kind")).kind)
                 sent.append((kept.sha256, file.name))
         if set(kinds) == {"model"}:
             for file in sent:
-                with refusals(partial(_told_of, file[1])):
+                with refusals(partial(_warn_of, file[1])):
                     sentence = await imported_model(service, file)
                     ui.notify(sentence, timeout=0, close_button="Close")
         elif sent:
@@ -84,15 +84,15 @@ class DropZone:
             ui.navigate.to(self._about.address("takes", files=written(files)))
 
 
-def _told_of(name: str, refusal: str) -> None:
+def _warn_of(name: str, refusal: str) -> None:
     ui.notify(f"{name}: {refusal}", type="warning", timeout=10_000)
 
 
 async def imported_model(service: Service, file: Uploaded) -> str:
     """What became of a dropped model. Raises Refusal."""
-    found = read(ImportedModel, await service.post(f"/models/import/{file[0]}", create_subject=True))
-    here = "was imported" if found.is_new else "was here already"
-    return f"{file[1]}: model {found.model.short} of {found.model.subject} {here}; it is not active."
+    imported = read(ImportedModel, await service.post(f"/models/import/{file[0]}", create_subject=True))
+    here = "was imported" if imported.is_new else "was here already"
+    return f"{file[1]}: model {imported.model.short} of {imported.model.subject} {here}; it is not active."
 
 
 _LISTEN = """{

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from dropping import drop
-from foreign_tables import laboratory, logger, semicolons
+from foreign_tables import SHAPES, laboratory, logger, semicolons
 from playwright.sync_api import Page, expect
 from studio_support import Open, serious
 
@@ -94,10 +94,8 @@ def test_improving_shows_the_error_fall_step_by_step(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("write", [semicolons, laboratory])
-def test_twelve_takes_whose_columns_name_their_joints(
-    opened: Open, tmp_path: Path, write: Callable[..., list[Path]]
-) -> None:
+@pytest.mark.parametrize("write", SHAPES)
+def test_twelve_takes_of_any_shape(opened: Open, tmp_path: Path, write: Callable[..., list[Path]]) -> None:
     page = opened("live").page
     assert from_the_drop_to_the_effect(page, write(tmp_path), f"dora-{write.__name__}", 12) <= MOST_CLICKS
 

@@ -59,9 +59,9 @@ def read_card(data: bytes, sensors: tuple[str, ...]) -> CardRecording:
 
 def card_layout(data: bytes) -> str | None:
     """The layout whose records a file, or its beginning, holds; None for one that is of no card."""
-    found = {layout: len(read_card(data, sensors).records) for layout, sensors in LAYOUTS.items()}
-    best = max(found, key=lambda layout: (found[layout], len(LAYOUTS[layout])))
-    return best if found[best] else None
+    records = {layout: len(read_card(data, sensors).records) for layout, sensors in LAYOUTS.items()}
+    best = max(records, key=lambda layout: (records[layout], len(LAYOUTS[layout])))
+    return best if records[best] else None
 
 
 def card_to_table(

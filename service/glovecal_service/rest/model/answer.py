@@ -158,7 +158,7 @@ class CalibrationPreview(Row):
     hand: Handedness = Field(description="Which the signs are read for.")
     rotations: list[CalibratedRotation]
     left_out: dict[str, str] = Field(description="Sensors without a line, and why.")
-    doubts: dict[str, str] = Field(description="Sensors whose line misses points of the file.")
+    misses: dict[str, str] = Field(description="Sensors whose line misses points of the file.")
 
     @property
     def sentence(self) -> str:

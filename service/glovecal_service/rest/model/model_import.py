@@ -96,9 +96,9 @@ def import_upload(
     options: Annotated[ModelImport, Query()],
 ) -> ImportedModel:
     """As `models/import` does with a file's bytes."""
-    found = _import(parts, kept_upload(parts, upload), options)
-    response.status_code = 201 if found.is_new else 200
-    return found
+    imported = _import(parts, kept_upload(parts, upload), options)
+    response.status_code = 201 if imported.is_new else 200
+    return imported
 
 
 def _import(parts: Parts, path: Path, options: ModelImport) -> ImportedModel:

@@ -73,7 +73,7 @@ def preview_calibration(body: Calibration, parts: PartsNeeded) -> CalibrationPre
     return CalibrationPreview(
         format=reading.form.name, title=reading.form.title, subject=body.subject, hand=reading.hand,
         layouts=[each.model.layout.name for each in reading.each()], layout=best.model.layout.name,
-        rotations=best.lines(), left_out=dict(best.found.left_out), doubts=dict(best.found.doubts),
+        rotations=best.lines(), left_out=dict(best.lines_read.left_out), misses=dict(best.lines_read.doubts),
     )  # fmt: skip
 
 
@@ -89,16 +89,16 @@ def import_calibration(body: ImportedAs, response: Response, parts: PartsNeeded)
     """Kept as a model of lines, each with its scale and offset; it is not activated. 422 names the line."""
     if not body.create_subject:
         parts.store.subjects.get(body.subject)
-    model, found = _Reading(parts, body).best()
+    model, lines = _Reading(parts, body).best()
     options = ModelImport(subject=body.subject, create_subject=body.create_subject, id=None)
     answer = import_artifact(parts, dump(model), options)
     response.status_code = 201 if answer.is_new else 200
-    return ImportedCalibration(**dict(answer), left_out=dict(found.left_out), doubts=dict(found.doubts))
+    return ImportedCalibration(**dict(answer), left_out=dict(lines.left_out), doubts=dict(lines.doubts))
 
 
 class _AsModel(NamedTuple):
     model: CalibrationModel
-    found: FoundLines
+    lines_read: FoundLines
 
     def lines(self) -> list[CalibratedRotation]:
         """Of the rotations that the file itself tells."""
@@ -133,14 +133,14 @@ class _Reading:
 
     def each(self) -> list[_AsModel]:
         """For every layout that it can be of, the likeliest first."""
-        found: list[_AsModel] = []
+        fitting: list[_AsModel] = []
         refused = BadInput("there is no layout of a glove; add one with glovecal glove layouts")
         for record in self._parts.store.layouts.list():
             try:
-                found.append(self._read(Layout.from_document(record.document)))
+                fitting.append(self._read(Layout.from_document(record.document)))
             except BadInput as error:
                 refused = error
-        if not found:
+        if not fitting:
             raise refused
         own = {take.layout for take in self._parts.store.takes.list(self._body.subject)}
 
@@ -148,7 +148,7 @@ class _Reading:
             layout = each.model.layout
             return -len(each.lines()), layout.name not in own, len(layout.sensors)
 
-        return sorted(found, key=fits)
+        return sorted(fitting, key=fits)
 
     def _read(self, layout: Layout) -> _AsModel:
         return _AsModel(*read_model(self._text, self.form, layout, self._body.subject, self.hand))

@@ -124,7 +124,7 @@ class PossibleTake(Row):
 
     id: str
     name: str
-    is_found: bool = Field(description="Whether movement tells that it belongs here, and when.")
+    is_matched: bool = Field(description="Whether movement tells that it belongs here, and when.")
     offset_s: float = Field(description="Reference time = frame time + offset.")
     has_reference: bool = Field(description="Attached before; it stays on file.")
     sentence: str

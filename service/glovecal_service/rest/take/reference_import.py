@@ -47,22 +47,22 @@ class AttachedReference(UploadedReference):
 def preview_reference(body: ReferenceOfSubject, parts: PartsNeeded) -> ReferencePreview:
     """The body names a table with angles and no readings, a TRC or a BVH file. Nothing is changed. 422 names
     what cannot be read."""
-    found = read_uploaded(parts, body, _hand_of_subject(parts, body.subject))
-    every = list(found.rows.values())
+    file = read_uploaded(parts, body, _hand_of_subject(parts, body.subject))
+    every = list(file.rows.values())
     steps = sum(len(rows.time_s) - 1 for rows in every)
     lasts = sum(float(rows.time_s[-1] - rows.time_s[0]) for rows in every)
     rotations = [
         ReferenceRotation(
-            rotation=name, made_of=list(found.made_of.get(name, (name,))), low_deg=float(np.nanmin(angles)),
+            rotation=name, made_of=list(file.made_of.get(name, (name,))), low_deg=float(np.nanmin(angles)),
             high_deg=float(np.nanmax(angles)), seen_share=float(np.isfinite(angles).mean()),
         )
-        for name, angles in _angles(found.rows).items()
+        for name, angles in _angles(file.rows).items()
     ]  # fmt: skip
-    takes, problem = _possible(parts, body.subject, found.rows)
+    takes, problem = _possible(parts, body.subject, file.rows)
     return ReferencePreview(
-        title=found.title, hand=found.hand, hands=list(found.hands), rows=steps + len(every),
+        title=file.title, hand=file.hand, hands=list(file.hands), rows=steps + len(every),
         rate_hz=steps / lasts if lasts > 0 else None, duration_s=lasts, rotations=rotations,
-        left_out=dict(found.left_out), odd=list(found.odd), takes=takes, problem=problem,
+        left_out=dict(file.left_out), odd=list(file.odd), takes=takes, problem=problem,
     )  # fmt: skip
 
 
@@ -76,8 +76,8 @@ def attach_reference(body: AttachedReference, parts: PartsNeeded) -> TakeRecord:
     """As the preview showed it; the reference that was there stays on file. 422 where not a row lies within
     the take."""
     record = parts.store.takes.get(body.take)
-    found = read_uploaded(parts, body, record.known_hand or _hand_of_subject(parts, record.subject))
-    rows = found.rows.get(record.name) or found.rows.get(None) or next(iter(found.rows.values()))
+    file = read_uploaded(parts, body, record.known_hand or _hand_of_subject(parts, record.subject))
+    rows = file.rows.get(record.name) or file.rows.get(None) or next(iter(file.rows.values()))
     take = parts.store.takes.load(record.id)
     joined = (
         join_reference(take, rows).take
@@ -104,11 +104,11 @@ def _hand_of_subject(parts: Parts, subject: str | None) -> Handedness | None:
 
 def _angles(references: ReferencesByTake) -> dict[str, np.ndarray]:
     """All angles of each rotation."""
-    found: dict[str, list[np.ndarray]] = {}
+    parts_of: dict[str, list[np.ndarray]] = {}
     for rows in references.values():
         for name, angles in zip(rows.rotations, rows.reference.T, strict=True):
-            found.setdefault(name, []).append(angles)
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+            parts_of.setdefault(name, []).append(angles)
+    return {name: np.concatenate(parts) for name, parts in parts_of.items()}
 
 
 def _possible(
@@ -117,7 +117,7 @@ def _possible(
     if subject is None:
         return [], None
     newest = ListPart(limit=MOST_TRIED, reverse=True)
-    found, refused = [], f"{subject} has no take that it could be of; import or record one first"
+    possible_takes, refused = [], f"{subject} has no take that it could be of; import or record one first"
     for record in parts.store.takes.list(subject, part=newest):
         own = references.get(record.name) or references.get(None)
         if own is None:
@@ -128,9 +128,9 @@ def _possible(
             refused = str(error)
             continue
         possible = PossibleTake(
-            id=record.id, name=record.name, is_found=joined.is_found, offset_s=joined.offset_s,
+            id=record.id, name=record.name, is_matched=joined.is_matched, offset_s=joined.offset_s,
             has_reference=bool(record.rotations), sentence=joined.sentence,
         )  # fmt: skip
-        found.append((not joined.is_found, joined.unexplained, possible))
-    found.sort(key=lambda each: each[:2])
-    return [possible for *_, possible in found], None if found else refused
+        possible_takes.append((not joined.is_matched, joined.unexplained, possible))
+    possible_takes.sort(key=lambda each: each[:2])
+    return [possible for *_, possible in possible_takes], None if possible_takes else refused

@@ -186,14 +186,14 @@ def _import(
     with parts.uploads.under_names(*files) as paths:
 
         def takes() -> list[TakeArrays]:
-            found = read_takes(
+            readings = read_takes(
                 *paths, name=options.name, wearing=options.wearing, equal_times=options.equal_times,
                 mapping=mapping,
             )  # fmt: skip
             if not references:
-                return found
+                return readings
             rows = [read_uploaded(parts, each).rows for each in references]
-            return [each.take for each in join_references(found, rows)]
+            return [each.take for each in join_references(readings, rows)]
 
         return import_takes(
             parts.store,

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.answer import ColumnMapping
 from glovecal_models.takes.table_preview import foreign_mapping
-from glovecal_service.motion_files.formats import motion_format
-from glovecal_service.motion_files.reference_file import (
+from glovecal_service.exports.motion_files.formats import motion_format
+from glovecal_service.exports.motion_files.reference_file import (
     ReferenceFile,
     read_reference_file,
     without_readings,
@@ -54,10 +54,10 @@ class UploadedReference(UploadedReadings):
 
 def kept_upload(parts: Parts, upload: str) -> Path:
     """Raises Problem 404."""
-    found = parts.uploads.find(upload)
-    if found is None:
+    path = parts.uploads.find(upload)
+    if path is None:
         raise Problem(404, "not-found", f"there is no upload {upload}; send the file to uploads first")
-    return found
+    return path
 
 
 def read_uploaded(parts: Parts, body: UploadedReference, hand: Handedness | None = None) -> ReferenceFile:

@@ -7,12 +7,12 @@ from typing import Any
 
 from nicegui import ui
 
-from glovecal_models.hand.rotations import HANDS
 from glovecal_service.rest.model.answer import CalibrationPreview, ImportedCalibration
 from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.drop import Uploaded
 from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.dropped_tables import USUAL_NAME
+from glovecal_service.studio.pages.left_out import tell_left_out
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import table, text_row
@@ -41,7 +41,7 @@ class DroppedCalibration:
             with ui.row().classes("choices"):
                 self._subject = ui.input("Whose calibration", value=whose, autocomplete=list(about.people))
                 self._layout = ui.select(seen.layouts, value=seen.layout, label="Glove")
-                self._hand = ui.select(list(HANDS), value=seen.hand, label="Hand")
+                self._hand = ui.select(["right", "left"], value=seen.hand, label="Hand")
                 main_act("Import the calibration", self._import)
             self._lines = ui.element("div")
         self._show(seen)
@@ -66,10 +66,9 @@ class DroppedCalibration:
         self._sentence.set_text(seen.sentence)
         self._lines.clear()
         with self._lines:
-            for sensor, why in seen.left_out.items():
-                ui.label(f"{sensor} is left out: {why}.").classes("take-warning")
-            for sensor, doubt in seen.doubts.items():
-                ui.label(f"{sensor}: {doubt}.").classes("take-warning")
+            tell_left_out(seen.left_out)
+            for sensor, miss in seen.misses.items():
+                ui.label(f"{sensor}: {miss}.").classes("take-warning")
             with (
                 ui.expansion("Rotations: gain and zero of each"),
                 table(f"Lines of {self._file[1]}", ("Rotation", "Sensor", "Degrees a count", "0° at")),
@@ -80,13 +79,13 @@ class DroppedCalibration:
     async def _import(self) -> None:
         body = {"upload": self._file[0], "create_subject": True} | self._chosen()
         with refusals(warn_long):
-            found = await self._studio.service.ask(ImportedCalibration, "/models/calibrations", body)
+            imported = await self._studio.service.ask(ImportedCalibration, "/models/calibrations", body)
             self._place.clear()
             with self._place:
-                here = "was imported" if found.is_new else "was here already"
-                heading(2, f"Model {found.model.short} of {found.model.subject} {here}")
+                here = "was imported" if imported.is_new else "was here already"
+                heading(2, f"Model {imported.model.short} of {imported.model.subject} {here}")
                 ui.label("It is not active, and its error is not known.")
-                ui.link("See it among the models", f"/models?who={found.model.subject}").classes(
+                ui.link("See it among the models", f"/models?who={imported.model.subject}").classes(
                     "studio-link"
                 )
-            await self._imported(found.model.subject, self._file)
+            await self._imported(imported.model.subject, self._file)

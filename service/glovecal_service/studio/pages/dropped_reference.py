@@ -14,11 +14,13 @@ from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.drop import Uploaded
 from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.dropped_tables import ColumnsTable, read_as, uploaded
+from glovecal_service.studio.pages.left_out import tell_left_out
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import table, text_row
 
 MOST_MADE_OF = 6
+NOT_FOUND = "Movement does not tell which take it belongs to: choose one, and it is said when it begins."
 
 
 class DroppedReference:
@@ -69,7 +71,7 @@ class DroppedReference:
                     self._subject = ui.select(
                         list(about.people), value=person, label="Person", on_change=self._other_person
                     )
-                    self._take = ui.select({}, label="Take", on_change=self._told_of_take).classes("choice")
+                    self._take = ui.select({}, label="Take", on_change=self._say_when).classes("choice")
                     self._act = main_act("Attach to the take", self._attach)
                 else:
                     ui.label("There is no take that it could be of. Drop the readings too.")
@@ -121,16 +123,14 @@ class DroppedReference:
                 each.id: each.name + (", has a reference" if each.has_reference else "")
                 for each in seen.takes
             }
-            self._take.set_options(names, value=next(iter(names), None))
-            self._act.set_enabled(bool(names))
-            self._told_of_take()
+            likeliest = next((each.id for each in seen.takes if each.is_matched), None)
+            self._take.set_options(names, value=likeliest)
+            self._say_when()
         self._facts.clear()
         with self._facts:
             for sentence in seen.odd:
                 ui.label(sentence).classes("take-warning")
-            if seen.left_out:
-                why = [f"{name} ({reason})" for name, reason in seen.left_out.items()]
-                ui.label(f"Left out: {first_of(why, MOST_MADE_OF)}.")
+            tell_left_out(seen.left_out)
             with (
                 ui.expansion("Rotations: what tells each"),
                 table(f"Rotations in {self.file[1]}", ("Rotation", "Told by", "From", "To", "Seen")),
@@ -146,9 +146,11 @@ class DroppedReference:
         wanted = None if self._take is None else self._take.value
         return next((each for each in self._seen.takes if each.id == wanted), None)
 
-    def _told_of_take(self) -> None:
+    def _say_when(self) -> None:
         own = self._chosen
-        self._of_take.set_text(own.sentence if own else self._seen.problem or "")
+        self._of_take.set_text(own.sentence if own else self._seen.problem or NOT_FOUND)
+        if self._act is not None:
+            self._act.set_enabled(own is not None)
 
     async def _attach(self) -> None:
         own = self._chosen

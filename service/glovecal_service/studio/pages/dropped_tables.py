@@ -197,7 +197,7 @@ class ColumnsTable:
     def __init__(self, changed: Callable[[ColumnMapping, bool], Awaitable[None]]) -> None:
         """``changed``: is awaited with the corrected mapping, and whether this table has to be built anew,
         which takes the focus from its fields."""
-        self._told = changed
+        self._changed_to = changed
 
     def build(self, seen: TablePreview) -> None:
         self._mapping = seen.mapping
@@ -240,7 +240,7 @@ class ColumnsTable:
         every = list(self._mapping.columns)
         every[at] = column
         self._mapping = replace(self._mapping, columns=tuple(every))
-        await self._told(self._mapping, columns)
+        await self._changed_to(self._mapping, columns)
 
 
 def _called(field: ui.element, name: str) -> None:

@@ -81,12 +81,12 @@ class _Lines:
 
     def numbers(self, text: str, count: int) -> list[float]:
         try:
-            found = [float(word) for word in text.split()]
+            values = [float(word) for word in text.split()]
         except ValueError:
             raise self.problem(f"{text[:40]!r} must be {count} numbers") from None
-        if len(found) != count:
-            raise self.problem(f"{len(found)} numbers, {count} were expected; {RIGHT}")
-        return found
+        if len(values) != count:
+            raise self.problem(f"{len(values)} numbers, {count} were expected; {RIGHT}")
+        return values
 
 
 def _hierarchy(lines: _Lines) -> list[Bone]:
@@ -163,10 +163,10 @@ def _places(bones: list[Bone], values: np.ndarray) -> np.ndarray:
 
 def _turn(axis: int, angle: np.ndarray) -> np.ndarray:
     """(N, 3, 3) about one axis, radians."""
-    found = np.zeros((len(angle), 3, 3))
+    values = np.zeros((len(angle), 3, 3))
     one, other = (axis + 1) % 3, (axis + 2) % 3
-    found[:, axis, axis] = 1.0
-    found[:, one, one] = found[:, other, other] = np.cos(angle)
-    found[:, other, one] = np.sin(angle)
-    found[:, one, other] = -np.sin(angle)
-    return found
+    values[:, axis, axis] = 1.0
+    values[:, one, one] = values[:, other, other] = np.cos(angle)
+    values[:, other, one] = np.sin(angle)
+    values[:, one, other] = -np.sin(angle)
+    return values

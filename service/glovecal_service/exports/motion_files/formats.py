@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from glovecal_service.exports.body_markers import BodyMarkers, read_trc
-from glovecal_service.motion_files.bvh_places import read_bvh
+from glovecal_service.exports.motion_files.bvh_places import read_bvh
 
 MARKED_WITHIN = 100
 
