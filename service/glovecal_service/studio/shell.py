@@ -59,7 +59,7 @@ class Around:
         return self.chosen.model
 
     async def is_now_about(self, person: str) -> None:
-        """Whose takes or model just came in stands in the header, in its links, in the address, and in the next step."""
+        """Whose takes or model came in stands in the header, its links, the address and the next step."""
         about = self.chosen.of_person(person)
         with self._header.place:  # whoever says it may stand in a place that is gone
             self._header.show(about)

@@ -112,20 +112,20 @@ class TakesPage:
     async def _imported(
         self, subject: str, layout: str, takes: Sequence[str], files: Sequence[Uploaded]
     ) -> None:
-        self._no_longer_waiting(files, subject)
+        await self._no_longer_waiting(files, subject)
         await self._train.take_on(subject, layout, takes)
 
     async def _attached(self, take: Take, file: Uploaded) -> None:
-        self._no_longer_waiting([file], take.subject)
+        await self._no_longer_waiting([file], take.subject)
         await self._train.take_on(take.subject, take.layout, [take.id])
 
     async def _imported_model(self, subject: str, file: Uploaded) -> None:
-        self._no_longer_waiting([file], subject)
+        await self._no_longer_waiting([file], subject)
 
-    def _no_longer_waiting(self, files: Sequence[Uploaded], subject: str) -> None:
+    async def _no_longer_waiting(self, files: Sequence[Uploaded], subject: str) -> None:
         drop = self._around.drop
         drop.waiting = [file for file in drop.waiting if file not in files]
-        self._around.is_now_about(subject)
+        await self._around.is_now_about(subject)
 
 
 def _problem(file: Uploaded, sentence: str) -> None:
