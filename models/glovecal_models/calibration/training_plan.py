@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from glovecal_models.calibration.chosen_inputs import with_chosen_inputs
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes, usable_folds, wearing_groups
 from glovecal_models.calibration.samples import (
@@ -51,7 +52,8 @@ class UsableSensors:
     """What is left of a layout. The glove still sends all its sensors: only what is read of them changes."""
 
     layout: Layout
-    """The same sensors; rotations are read from those that live."""
+    """The same sensors; rotations are read from those that live, and where nobody said which from those that
+    explain them (``chosen_inputs``)."""
     dead: tuple[DeadSensor, ...]
     """Of the sensors that some rotation was read from."""
     unreadable: tuple[str, ...]
@@ -67,8 +69,12 @@ def usable_sensors(layout: Layout, takes: Sequence[Take]) -> UsableSensors:
     reduced = [_reduced(item, dead) for item in layout.correspondences]
     read = {name for item in layout.correspondences for name in item.sensors}
     kept = (now or before for now, before in zip(reduced, layout.correspondences, strict=True))
+    living = replace(layout, correspondences=tuple(kept)) if dead & read else layout
+    unassigned = [
+        item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)
+    ]
     return UsableSensors(
-        replace(layout, correspondences=tuple(kept)) if dead & read else layout,
+        with_chosen_inputs(living, unassigned, takes),
         tuple(item for item in found if item.sensor in read),
         tuple(name for name, now in zip(layout.rotations, reduced, strict=True) if now is None),
     )

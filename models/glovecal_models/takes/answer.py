@@ -203,6 +203,16 @@ class TablePreview(Answer):
     def __post_init__(self) -> None:
         object.__setattr__(self, "sentence", _made(self))
 
+    @property
+    def is_reference(self) -> bool:
+        """Whether it holds angles and no readings."""
+        return bool(self.mapping.of("rotation")) and not self.mapping.of("sensor")
+
+    @property
+    def is_unmeasured(self) -> bool:
+        """Whether it holds readings and no angles."""
+        return bool(self.mapping.of("sensor")) and not self.mapping.of("rotation")
+
     def presentation(self) -> Presentation:
         columns = Table(
             [*map(Column, ("column", "is", "name", "unit")), Column("because", folds=True), Column("first")],
@@ -232,6 +242,9 @@ class TablePreview(Answer):
 
 
 def _made(found: TablePreview) -> str:
+    if found.is_reference:
+        measured = counted(len(found.mapping.of("rotation")), "rotation")
+        return f"{measured} measured, and no readings: this is the reference of a take recorded elsewhere."
     if found.problem:
         return f"Nothing can be imported as it is read now: {found.problem}."
     return of_takes(found.takes)

@@ -256,8 +256,11 @@ def _mean_square(values: np.ndarray) -> float:
 
 
 def _judged(take: Take, grid: Grid | None, scan: np.ndarray | None, offset_s: float | None) -> ClockOffset:
-    if grid is None or scan is None or offset_s is None:
-        sentence = f"Take {take.name}: the clocks cannot be judged; too short, or the reference never moves."
+    if grid is None or scan is None or offset_s is None or not np.isfinite(scan).any():
+        sentence = (
+            f"Take {take.name}: the clocks cannot be judged; too short, or the reference never moves, or "
+            "hardly overlaps it."
+        )
         return ClockOffset(take.name, "not identifiable", 0.0, -RANGE_S, RANGE_S, 1.0, 1.0, 1.0, sentence)
     before = unexplained(grid, grid.readings, grid.time_s)
     after = unexplained(grid, grid.readings, grid.time_s + offset_s)

@@ -92,9 +92,10 @@ def read_takes(
     return takes
 
 
-def read_reference(path: Path) -> dict[str | None, ReferenceRows]:
-    """A reference table alone, by take name (None where it has no ``take`` column). Raises BadTakeTable."""
-    table = _read_reference_table(path)
+def read_reference(path: Path, mapping: ColumnMapping | None = None) -> dict[str | None, ReferenceRows]:
+    """A reference table alone, by take name (None where it has no ``take`` column). ``mapping``: how it is
+    read, if its columns have names of their own. Raises BadTakeTable."""
+    table = _read_reference_table(path, mapping)
     return {key: _reference_rows(table, rows) for key, rows in _rows_by_take(table).items()}
 
 
@@ -143,8 +144,8 @@ def _with_spread_times(table: RawTable) -> RawTable:
     return replace(table, numbers=table.numbers | {"time_s": time})
 
 
-def _read_reference_table(path: Path) -> RawTable:
-    table = _read_table(path)
+def _read_reference_table(path: Path, mapping: ColumnMapping | None = None) -> RawTable:
+    table = _read_table(path, mapping=mapping)
     refused: tuple[ColumnKind, ...] = ("sensor", "context", "wearing")
     for column in table.columns:
         if column.kind in refused:

@@ -56,9 +56,11 @@ from glovecal_service.rest.sampling import next_steps, samplings
 from glovecal_service.rest.subject import subjects, usual_hand
 from glovecal_service.rest.take import (
     clocks,
+    dropped,
     hands,
     motion,
     reference,
+    reference_import,
     series,
     session_drift,
     table_import,
@@ -89,7 +91,9 @@ ROUTERS = (
         table_import,
         takes,
         reference,
+        reference_import,
         uploads,
+        dropped,
         motion,
         videos,
     ),

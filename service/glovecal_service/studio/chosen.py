@@ -37,11 +37,17 @@ class Chosen:
         """Whether the model is of a simulated hand, which nobody's own takes belong to."""
         return self.model is not None and bool(self.model.facts.get("simulated"))
 
-    def address(self, page: str) -> str:
-        """Of another page about the same."""
-        kept = {"who": self.person, "model": self.model.short if self.model else ""}
+    def address(self, page: str, **more: str) -> str:
+        """Of another page about the same, and ``more`` that it is told."""
+        kept = {"who": self.person, "model": self.model.short if self.model else "", **more}
         query = urlencode({name: value for name, value in kept.items() if value})
         return f"/{page}?{query}" if query else f"/{page}"
+
+    def of_person(self, person: str) -> Chosen:
+        """The same page about somebody who may have been added on it; models are asked for on other pages."""
+        if person == self.person:
+            return self
+        return Chosen(tuple(dict.fromkeys([*self.people, person])), person, (), None, "")
 
     async def takes(self, service: Service) -> list[Take]:
         """The person's, the newest of them, in the order they were added."""
@@ -59,16 +65,15 @@ class Chosen:
         def other_model(event: ValueChangeEventArguments) -> None:
             ui.navigate.to(f"/{page}?model={event.value}")
 
-        with ui.element("div").classes("studio-chosen"):
-            if self.people:
-                ui.select(list(self.people), value=self.person, label="Person", on_change=other_person).props(
-                    "dense"
-                ).classes("choice")
-            if about_models and self.model is not None:
-                names = {each.id: version_name(each) for each in self.models}
-                ui.select(names, value=self.model.id, label="Model", on_change=other_model).props(
-                    "dense"
-                ).classes("choice")
+        if self.people:
+            ui.select(list(self.people), value=self.person, label="Person", on_change=other_person).props(
+                "dense"
+            ).classes("choice")
+        if about_models and self.model is not None:
+            names = {each.id: version_name(each) for each in self.models}
+            ui.select(names, value=self.model.id, label="Model", on_change=other_model).props(
+                "dense"
+            ).classes("choice")
 
 
 async def chosen(service: Service) -> Chosen:

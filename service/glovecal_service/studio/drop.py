@@ -1,18 +1,20 @@
-"""Files dropped on any page: tables go to the page Takes, models are imported."""
+"""Files dropped on any page: what they are is shown on the page Takes; models are imported at once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from urllib.parse import quote, unquote
 
 from nicegui import events, ui
 
 from glovecal_service.plain import read
 from glovecal_service.rest.model.answer import ImportedModel
-from glovecal_service.rest.take.answer import UploadedFile
-from glovecal_service.studio.service import Refusal
+from glovecal_service.rest.take.answer import UploadedFile, UploadKind
+from glovecal_service.studio.chosen import Chosen
+from glovecal_service.studio.service import Service, refusals
 from glovecal_service.studio.studio import Studio
 
-OF_MODELS = ".safetensors"
 MOST_AT_ONCE = 200
 KEPT_AS = "application/octet-stream"
 
@@ -20,23 +22,26 @@ Uploaded = tuple[str, str]
 """sha256, and the name on the computer that it came from."""
 
 
-def address_of(files: list[Uploaded]) -> str:
-    """Of the page that shows what these tables are."""
-    return "/takes?files=" + quote(",".join(f"{sha}:{quote(name, safe='')}" for sha, name in files))
+def written(files: Sequence[Uploaded]) -> str:
+    """As they stand in the address of the page that shows what they are."""
+    return ",".join(f"{sha}:{quote(name, safe='')}" for sha, name in files)
 
 
 def files_of(query: str) -> list[Uploaded]:
-    """What ``address_of`` was given."""
+    """What ``written`` was given."""
     pairs = (item.partition(":") for item in query.split(",") if item)
     return [(sha, unquote(name)) for sha, _, name in pairs]
 
 
 class DropZone:
-    """The whole page takes files, from a drop or from ``button``. Tables are shown on the page Takes; what
-    becomes of models, and refusals, are notices."""
+    """The whole page takes files, from a drop or from ``button``. What they are is shown on the page Takes;
+    what becomes of models, and refusals, are notices."""
 
-    def __init__(self, studio: Studio) -> None:
+    def __init__(self, studio: Studio, about: Chosen) -> None:
         self._studio = studio
+        self._about = about
+        self.waiting: Sequence[Uploaded] = ()
+        """Files that the page shows and that nobody imported yet: what comes next is shown with them."""
         # The library's own field has no name for those who hear the page; a button or a drop fills it.
         with ui.element("div").classes("capture-upload"):
             self._field = ui.upload(
@@ -60,29 +65,34 @@ class DropZone:
 
     async def _received(self, event: events.MultiUploadEventArguments) -> None:
         self._field.reset()
-        tables: list[Uploaded] = []
+        service = self._studio.service
+        sent: list[Uploaded] = []
+        kinds: list[str] = []
         for file in event.files:
-            content = await file.read()
-            try:
-                if file.name.lower().endswith(OF_MODELS):
-                    await self._import_model(file.name, content)
-                else:
-                    kept = await self._studio.service.post_file("/uploads", content, KEPT_AS)
-                    tables.append((read(UploadedFile, kept).sha256, file.name))
-            except Refusal as refusal:
-                ui.notify(f"{file.name}: {refusal}", type="warning", timeout=10_000)
-        if tables:
-            ui.navigate.to(address_of(tables))
+            with refusals(partial(_warn_of, file.name)):
+                answer = await service.post_file("/uploads", await file.read(), KEPT_AS)
+                kept = read(UploadedFile, answer)
+                kinds.append((await service.read(UploadKind, f"/uploads/{kept.sha256}/kind")).kind)
+                sent.append((kept.sha256, file.name))
+        if set(kinds) == {"model"}:
+            for file in sent:
+                with refusals(partial(_warn_of, file[1])):
+                    sentence = await imported_model(service, file)
+                    ui.notify(sentence, timeout=0, close_button="Close")
+        elif sent:
+            files = list(dict.fromkeys([*self.waiting, *sent]))
+            ui.navigate.to(self._about.address("takes", files=written(files)))
 
-    async def _import_model(self, name: str, content: bytes) -> None:
-        kept = await self._studio.service.post_file("/models/import", content, KEPT_AS, create_subject=True)
-        found = read(ImportedModel, kept)
-        here = "was imported" if found.is_new else "was here already"
-        ui.notify(
-            f"{name}: model {found.model.short} of {found.model.subject} {here}; it is not active.",
-            timeout=0,
-            close_button="Close",
-        )
+
+def _warn_of(name: str, refusal: str) -> None:
+    ui.notify(f"{name}: {refusal}", type="warning", timeout=10_000)
+
+
+async def imported_model(service: Service, file: Uploaded) -> str:
+    """What became of a dropped model. Raises Refusal."""
+    imported = read(ImportedModel, await service.post(f"/models/import/{file[0]}", create_subject=True))
+    here = "was imported" if imported.is_new else "was here already"
+    return f"{file[1]}: model {imported.model.short} of {imported.model.subject} {here}; it is not active."
 
 
 _LISTEN = """{

@@ -36,8 +36,9 @@ class NextStepLine:
         self._service, self._about, self._here = service, about, here
         self._line = ui.element("div").classes("next-in-a-line").props('role="note" aria-label="Next step"')
 
-    async def look(self) -> None:
-        """Again, once something was done."""
+    async def look(self, about: Chosen | None = None) -> None:
+        """Again, once something was done. ``about``: whose step from now on; None: as before."""
+        self._about = about or self._about
         with suppress(Refusal):  # the page itself says what is wrong
             step = (await _overview(self._service, self._about)).steps[0]
             self._line.clear()

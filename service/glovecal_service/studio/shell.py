@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -46,6 +47,8 @@ class Around:
 
     drop: DropZone
     chosen: Chosen
+    _header: Header
+    _line: NextStepLine
 
     async def model(self, service: Service) -> Model | None:
         """The one that is chosen; where there is none, what to do next is shown."""
@@ -54,6 +57,46 @@ class Around:
             ui.label(f"No model{whose} yet.").classes("studio-notice")
             await next_steps(service, self.chosen)
         return self.chosen.model
+
+    async def is_now_about(self, person: str) -> None:
+        """Whose takes or model came in stands in the header, its links, the address and the next step."""
+        about = self.chosen.of_person(person)
+        with self._header.place:  # whoever says it may stand in a place that is gone
+            self._header.show(about)
+        await self._line.look(about)
+
+
+class Header:
+    """Navigation, and who and which model a page is about."""
+
+    def __init__(self, here: str, title: str, *, about_models: bool) -> None:
+        self._here, self._title, self._about_models = here, title, about_models
+        with ui.element("nav").props('aria-label="Pages"').classes("studio-nav") as self.place:
+            pass
+        ui.space()
+        self._choice = ui.element("div").classes("studio-chosen")
+        self._shown: str | None = None
+
+    def show(self, about: Chosen) -> None:
+        ui.page_title(" – ".join(filter(None, (about.person, self._title, "Glovecal"))))
+        if self._shown not in (None, about.person):
+            ui.run_javascript(
+                f"history.replaceState(null, '', '?' + {_KEEP_WHO}({json.dumps(about.person)}))"
+            )
+        self._shown = about.person
+        self.place.clear()
+        with self.place:
+            for address, name in NAVIGATION:
+                link = ui.link(name, about.address(address)).classes("studio-link")
+                if address == self._here:
+                    link.props('aria-current="page"')
+        self._choice.clear()
+        with self._choice:
+            about.selects(self._here, about_models=self._about_models)
+
+
+_KEEP_WHO = """(who => { const kept = new URLSearchParams(location.search);
+  kept.set("who", who); kept.delete("model"); return kept; })"""
 
 
 @asynccontextmanager
@@ -68,17 +111,11 @@ async def shell(
     ui.add_head_html('<link rel="stylesheet" href="/studio/static/studio.css">')
     for script in ("words", "tables"):
         ui.add_head_html(f'<script type="module" src="/studio/static/{script}.js"></script>')
-    ui.page_title(" – ".join(filter(None, (about.person, title, "Glovecal"))))
     with ui.header(elevated=False).classes("studio-header"):
         ui.link("Skip to content", "#main").classes("studio-skip")
         ui.label("Glovecal").classes("studio-name")
-        with ui.element("nav").props('aria-label="Pages"').classes("studio-nav"):
-            for address, name in NAVIGATION:
-                link = ui.link(name, about.address(address)).classes("studio-link")
-                if address == here:
-                    link.props('aria-current="page"')
-        ui.space()
-        about.selects(here, about_models=about_models)
+        header = Header(here, title, about_models=about_models)
+        header.show(about)
         drawer = JobsDrawer(studio)
     with ui.element("div").props('id="main" tabindex="-1"').classes("studio-main"):
         heading(1, title)
@@ -86,7 +123,7 @@ async def shell(
             ui.label(about.notice).classes("studio-notice").props('role="status"')
         line = NextStepLine(studio.service, about, here)
         await line.look()
-        yield Around(DropZone(studio), about)
+        yield Around(DropZone(studio, about), about, header, line)
     drawer.start(line.look)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -11,6 +12,8 @@ from glovecal_models.hand.rotations import Handedness
 
 MOST_CHARACTERS = 1 << 20
 """Of a file; the longest of these formats has a few thousand."""
+MARKED_WITHIN = 4000
+"""Characters in which a format's mark stands."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,11 @@ class CalibrationFormat:
     """Raises BadInput, with the line, for text that is none of this format."""
     write: Write
     """Raises BadInput."""
+    mark: re.Pattern[str]
+    """What such a file has at its beginning and no other format has, also where the rest is damaged."""
+
+    def recognises(self, text: str) -> bool:
+        return self.mark.search(text[:MARKED_WITHIN]) is not None
 
 
 def require_lines(found: FoundLines, what: str) -> FoundLines:

@@ -20,6 +20,7 @@ taken from the two published files.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 from glovecal_models.errors import BadInput
@@ -119,8 +120,9 @@ def write_virtualhand(lines: Mapping[str, SensorLine], counts: Counts, hand: Han
 
 
 VIRTUALHAND = CalibrationFormat(
-    "virtualhand", "VirtualHand and DCU (.cal)", read_virtualhand, write_virtualhand
-)
+    "virtualhand", "VirtualHand and DCU (.cal)", read_virtualhand, write_virtualhand,
+    re.compile(r"^\s*(FINGER 0|Thumb)\b.*\n(\s*!.*\n)*\s*0(\s+[-+.\deE]+){2}", re.MULTILINE),
+)  # fmt: skip
 
 
 ORDER = (
@@ -174,4 +176,7 @@ def write_asr(lines: Mapping[str, SensorLine], counts: Counts, hand: Handedness)
     return "\n".join([*text, ""])
 
 
-ASR = CalibrationFormat("asr", "ASR CyberGlove library (.cal, two points)", read_asr, write_asr)
+ASR = CalibrationFormat(
+    "asr", "ASR CyberGlove library (.cal, two points)", read_asr, write_asr,
+    re.compile(r"\A\s*[-+.\deE]+:[-+.\deE]+[ \t]+[-+.\deE]+:[-+.\deE]+[ \t]*\r?$", re.MULTILINE),
+)  # fmt: skip

@@ -14,6 +14,7 @@ left out.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -69,8 +70,9 @@ def write_opengloves(lines: Mapping[str, SensorLine], counts: Counts, hand: Hand
 
 
 OPENGLOVES = CalibrationFormat(
-    "opengloves", "OpenGloves (smallest and largest reading, JSON)", read_opengloves, write_opengloves
-)
+    "opengloves", "OpenGloves (smallest and largest reading, JSON)", read_opengloves, write_opengloves,
+    re.compile(rf'\A\s*\{{\s*"({"|".join(FINGERS.values())})"\s*:\s*\{{\s*"(min|max)"'),
+)  # fmt: skip
 
 
 PARTS = {"cmc": "CMC", "mcp": "MCP", "pip": "PIP", "dip": "DIP", "mcp_flexion": "MCP", "mcp_abduction": "ABD"}
@@ -145,5 +147,6 @@ def write_lerobot(lines: Mapping[str, SensorLine], counts: Counts, hand: Handedn
 
 
 LEROBOT = CalibrationFormat(
-    "lerobot", "LeRobot (Homunculus glove: ranges of joints, JSON)", read_lerobot, write_lerobot
-)
+    "lerobot", "LeRobot (Homunculus glove: ranges of joints, JSON)", read_lerobot, write_lerobot,
+    re.compile(r'\A\s*\{\s*"\w+"\s*:\s*\{[^{}]*"(range_min|range_max|drive_mode|homing_offset)"'),
+)  # fmt: skip

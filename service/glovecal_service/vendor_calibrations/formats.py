@@ -6,6 +6,7 @@ Nobody knows how far an imported line is from the truth: it claims ``ASSUMED_SD_
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -138,7 +139,7 @@ def write_model(model: CalibrationModel, form: CalibrationFormat, hand: Handedne
     for item in model.rotations:
         if isinstance(item.regressor, RuleRegressor):
             continue
-        line = _line(item)
+        line = rotation_line(item)
         sensor = item.correspondence.sensors[0]
         of = sensor if sensor in model.rotation_names else JOINTS.get(sensor[:1], item.rotation)
         if line is None:
@@ -156,8 +157,8 @@ def write_model(model: CalibrationModel, form: CalibrationFormat, hand: Handedne
     return WrittenLines(form.write(lines, counts_of(model.layout), hand), left_out)
 
 
-def _line(item: RotationModel) -> SensorLine | None:
-    """Of one sensor alone."""
+def rotation_line(item: RotationModel) -> SensorLine | None:
+    """Of a rotation that is read from one sensor alone; None for any other."""
     if not isinstance(item.regressor, LinearRegressor) or item.correspondence.simulated is not None:
         return None
     gains, offset = gains_of(item.regressor)
@@ -175,6 +176,28 @@ if TYPE_CHECKING:
     FormatName = str
 else:
     FormatName = Literal[tuple(FORMATS)]
+
+
+def calibration_text(path: Path) -> str:
+    """The whole file, UTF-8 or else Windows-1252. Raises BadInput for one that is too long."""
+    if path.stat().st_size > MOST_CHARACTERS:
+        raise BadInput(f"{path.stat().st_size} bytes are no calibration: {MOST_CHARACTERS} at most")
+    return as_text(path.read_bytes())
+
+
+def as_text(content: bytes) -> str:
+    """ "" for what is no text."""
+    if b"\0" in content:
+        return ""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", "replace")
+
+
+def recognised(text: str) -> CalibrationFormat | None:
+    """By what stands in the file; None for what is no calibration of another program."""
+    return next((one for one in FORMATS.values() if one.recognises(text)), None)
 
 
 def calibration_format(name: str) -> CalibrationFormat:

@@ -114,7 +114,9 @@ def write_xml(lines: Mapping[str, SensorLine], counts: Counts, hand: Handedness)
     return '<?xml version="1.0" ?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-SHADOW_XML = CalibrationFormat("shadow_xml", "Shadow CyberGlove driver (XML)", read_xml, write_xml)
+SHADOW_XML = CalibrationFormat(
+    "shadow_xml", "Shadow CyberGlove driver (XML)", read_xml, write_xml, re.compile(rf"<{ROOT}\b")
+)
 
 
 KEY = "cyberglove_calibration"
@@ -156,4 +158,7 @@ def write_yaml(lines: Mapping[str, SensorLine], counts: Counts, hand: Handedness
     return "\n".join([*text, "]}", ""])
 
 
-SHADOW_YAML = CalibrationFormat("shadow_yaml", "Shadow CyberGlove driver (YAML)", read_yaml, write_yaml)
+SHADOW_YAML = CalibrationFormat(
+    "shadow_yaml", "Shadow CyberGlove driver (YAML)", read_yaml, write_yaml,
+    re.compile(rf"^\s*\{{?\s*['\"]?{KEY}['\"]?\s*:", re.MULTILINE),
+)  # fmt: skip

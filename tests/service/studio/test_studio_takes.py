@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from foreign_tables import laboratory, logger, semicolons
+from dropping import drop
+from foreign_tables import SHAPES, laboratory, logger, semicolons
 from playwright.sync_api import Browser, Page, expect
 from studio_support import PATIENCE_MS, Open, serious
 
@@ -27,23 +27,6 @@ NAMED = "hysteresis"
 def client(address: str) -> Iterator[RestClient]:
     with RestClient(address) as client:
         yield client
-
-
-def drop(page: Page, files: Sequence[Path]) -> None:
-    """As from a file manager onto the middle of the page."""
-    page.locator(".q-uploader").wait_for(state="attached")
-    dropped = [{"name": file.name, "data": base64.b64encode(file.read_bytes()).decode()} for file in files]
-    page.evaluate(
-        """files => {
-            const dropped = new DataTransfer();
-            const bytes = file => Uint8Array.from(atob(file.data), c => c.charCodeAt(0));
-            for (const file of files)
-                dropped.items.add(new File([bytes(file)], file.name));
-            document.querySelector("#main").dispatchEvent(
-                new DragEvent("drop", {dataTransfer: dropped, bubbles: true, cancelable: true}));
-        }""",
-        dropped,
-    )
 
 
 class Clicks:
@@ -113,10 +96,8 @@ def test_improving_shows_the_error_fall_step_by_step(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("write", [semicolons, laboratory])
-def test_twelve_takes_whose_columns_name_their_joints(
-    opened: Open, tmp_path: Path, write: Callable[..., list[Path]]
-) -> None:
+@pytest.mark.parametrize("write", SHAPES)
+def test_twelve_takes_of_any_shape(opened: Open, tmp_path: Path, write: Callable[..., list[Path]]) -> None:
     page = opened("live").page
     assert from_the_drop_to_the_effect(page, write(tmp_path), f"dora-{write.__name__}", 12) <= MOST_CLICKS
 

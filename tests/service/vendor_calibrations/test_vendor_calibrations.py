@@ -26,6 +26,7 @@ from glovecal_service.vendor_calibrations.formats import (
     FORMATS,
     calibration_format,
     read_model,
+    recognised,
     write_model,
 )
 from glovecal_service.vendor_calibrations.shadow import lines_through
@@ -59,6 +60,27 @@ def test_what_is_written_is_read_again(name: str, hand, data: st.DataObject) -> 
         for reading in (10.0, 128.0, 250.0):
             angle, found = (each.gain * (reading - each.zero) for each in (line, again[sensor]))
             assert found == pytest.approx(angle, abs=0.1)  # five decimals of radians a count
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@given(data=st.data())
+@settings(max_examples=25)
+def test_a_file_is_recognised_by_what_it_holds_also_cut_short(name: str, data: st.DataObject) -> None:
+    form, layout = FORMATS[name], LAYOUT_OF[name]
+    lines = data.draw(st.dictionaries(st.sampled_from(layout.sensors), LINE, min_size=1))
+    text = form.write(lines, EIGHT, "right")
+    assert [one.name for one in FORMATS.values() if one.recognises(text)] == [name]
+    cut = text[: data.draw(st.integers(0, len(text)))]
+    assert recognised(cut) in (form, None)
+    assert recognised("\ufeff" + text) in (form, None)
+
+
+def test_the_makers_dialect_is_recognised_and_tables_are_not() -> None:
+    rows = "".join(f"{row} 70 0.018 1\n" for row in range(4))
+    dcu = "DCU calibration\n" + "".join(f"{name}\n{rows}" for name in ("Thumb", "Index", "Middle"))
+    assert recognised(dcu) is FORMATS["virtualhand"]
+    for text in ("", "time_s,s.A\n0,1\n", "Thumb;Index\n0 1\n", "time 10:20 10:30\n", "{}", '{"thumb": 3}'):
+        assert recognised(text) is None
 
 
 @pytest.mark.parametrize("name", FORMATS)

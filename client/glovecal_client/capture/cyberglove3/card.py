@@ -57,6 +57,13 @@ def read_card(data: bytes, sensors: tuple[str, ...]) -> CardRecording:
     return CardRecording(data[:first], records, counters.bad_frames, between, data[end:])
 
 
+def card_layout(data: bytes) -> str | None:
+    """The layout whose records a file, or its beginning, holds; None for one that is of no card."""
+    records = {layout: len(read_card(data, sensors).records) for layout, sensors in LAYOUTS.items()}
+    best = max(records, key=lambda layout: (records[layout], len(LAYOUTS[layout])))
+    return best if records[best] else None
+
+
 def card_to_table(
     source: Path, target: Path, *, layout: str, frame_rate: float, multiplier: int
 ) -> CardRecording:

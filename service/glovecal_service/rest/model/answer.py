@@ -9,6 +9,7 @@ from pydantic import Field
 
 from glovecal_models.calibration.answer import ModelEffect
 from glovecal_models.hand.rotations import Handedness
+from glovecal_models.presentation.document import counted
 from glovecal_service.plain import Row
 
 
@@ -137,6 +138,34 @@ class ImportedCalibration(ImportedModel):
     doubts: dict[str, str] = Field(
         description="Sensors whose line misses points of the file, and by how much."
     )
+
+
+class CalibratedRotation(Row):
+    """angle = gain_deg x (reading - zero)."""
+
+    rotation: str
+    sensor: str
+    gain_deg: float = Field(description="Degrees a count.")
+    zero: float = Field(description="The reading at which it is 0 degrees, counts.")
+
+
+class CalibrationPreview(Row):
+    format: str
+    title: str = Field(description="Whose format it is.")
+    layouts: list[str] = Field(description="Gloves that it can be of; those of most rotations first.")
+    layout: str = Field(description="Of the glove that it is read for.")
+    subject: str = Field(description="Whose model it would become.")
+    hand: Handedness = Field(description="Which the signs are read for.")
+    rotations: list[CalibratedRotation]
+    left_out: dict[str, str] = Field(description="Sensors without a line, and why.")
+    misses: dict[str, str] = Field(description="Sensors whose line misses points of the file.")
+
+    @property
+    def sentence(self) -> str:
+        return (
+            f"{self.title}: {counted(len(self.rotations), 'rotation')} of glove {self.layout}, "
+            f"{self.hand} hand. It becomes a linear model of {self.subject}, whose error nobody knows yet."
+        )
 
 
 class CalibrationFile(Row):

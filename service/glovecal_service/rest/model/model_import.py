@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import anyio.to_thread
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
+from fastapi import Path as InPath
 from pydantic import BaseModel, Field, ValidationError
 
 from glovecal_models.calibration.artifact import load, model_id
@@ -16,11 +17,12 @@ from glovecal_models.calibration.explanation import FrameExplainer
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.servable import check_servable
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.request_types import SHA256_PREFIX, SubjectName
+from glovecal_service.request_types import SHA256, SHA256_PREFIX, SubjectName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem, change_problems
 from glovecal_service.rest.model.answer import ImportedModel
 from glovecal_service.rest.model.models import model_in_full, model_row
+from glovecal_service.rest.take.uploaded_files import kept_upload
 from glovecal_service.store.database import now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import ModelRecord, TakeRecord, hand_of
@@ -77,6 +79,26 @@ async def import_model(
             upload.path.unlink(missing_ok=True)
     response.status_code = 201 if found.is_new else 200
     return found
+
+
+@router.post(
+    "/import/{upload}",
+    status_code=201,
+    response_model=ImportedModel,
+    summary="Import a model's artifact that was sent to uploads",
+    responses=change_problems(409)
+    | {200: {"model": ImportedModel, "description": "This very model was here already."}},
+)
+def import_upload(
+    upload: Annotated[str, InPath(pattern=SHA256)],
+    response: Response,
+    parts: PartsNeeded,
+    options: Annotated[ModelImport, Query()],
+) -> ImportedModel:
+    """As `models/import` does with a file's bytes."""
+    imported = _import(parts, kept_upload(parts, upload), options)
+    response.status_code = 201 if imported.is_new else 200
+    return imported
 
 
 def _import(parts: Parts, path: Path, options: ModelImport) -> ImportedModel:

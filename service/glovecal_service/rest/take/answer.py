@@ -8,10 +8,12 @@ from typing import Any, Literal
 from pydantic import Field
 
 from glovecal_models.hand.rotations import Handedness
+from glovecal_models.presentation.document import counted
 from glovecal_models.takes.camera_estimates import CoveredRange
 from glovecal_models.takes.hand_clocks import How
 from glovecal_models.takes.take import ReferenceJump, Stretch
 from glovecal_models.takes.take_check import RotationRange, SensorRange
+from glovecal_service.file_kinds import FileKind
 from glovecal_service.plain import Row
 
 
@@ -110,6 +112,71 @@ class ImportedTakes(Row):
 class UploadedFile(Row):
     sha256: str = Field(description="The name to give where an upload is asked for.")
     size: int = Field(description="Bytes.")
+
+
+class UploadKind(Row):
+    kind: FileKind
+
+
+class CardTable(UploadedFile):
+    """A recording of a memory card, now a take table of this name."""
+
+    layout: str = Field(description="Of the glove that recorded it.")
+    records: int
+    seconds: float
+    damaged: int = Field(description="Records that were cut short, or out of range.")
+    skipped_bytes: int = Field(description="Between records, of none.")
+
+    @property
+    def sentence(self) -> str:
+        return (
+            f"Memory card of a CyberGlove III, {self.layout}: {self.records} records over "
+            f"{self.seconds:.1f} s, {self.damaged} damaged, {self.skipped_bytes} bytes between records."
+        )
+
+
+class ReferenceRotation(Row):
+    rotation: str
+    made_of: list[str] = Field(description="Markers, bones or the column of the file that tell it.")
+    low_deg: float
+    high_deg: float
+    seen_share: float = Field(description="Of the rows in which it was measured.")
+
+
+class PossibleTake(Row):
+    """A take that the reference may belong to."""
+
+    id: str
+    name: str
+    is_matched: bool = Field(description="Whether movement tells that it belongs here, and when.")
+    offset_s: float = Field(description="Reference time = frame time + offset.")
+    has_reference: bool = Field(description="Attached before; it stays on file.")
+    sentence: str
+
+
+class ReferencePreview(Row):
+    """What a file of another measuring system tells, and of which take it is."""
+
+    title: str = Field(description="What kind of file it is.")
+    hand: Handedness | None = Field(description="Whose angles they are; null: a table does not say it.")
+    hands: list[Handedness] = Field(description="That the file holds.")
+    rows: int
+    rate_hz: float | None = Field(description="By the mean interval between rows.")
+    duration_s: float
+    rotations: list[ReferenceRotation]
+    left_out: dict[str, str] = Field(description="Rotations that it does not tell, and why.")
+    odd: list[str] = Field(description="What looks wrong in it.")
+    takes: list[PossibleTake] = Field(description="Of the subject, the likeliest first.")
+    problem: str | None = Field(description="Why it belongs to none of them.")
+
+    @property
+    def sentence(self) -> str:
+        rate = "" if self.rate_hz is None else f" at {self.rate_hz:.1f} Hz"
+        of_hand = f" of the {self.hand} hand" if self.hand else ""
+        return (
+            f"{self.title}: {counted(len(self.rotations), 'rotation')}{of_hand}, {self.rows} rows{rate}, "
+            f"{self.duration_s:.1f} s."
+        )
 
 
 class CameraReferenceView(Row):

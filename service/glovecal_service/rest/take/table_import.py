@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import anyio.to_thread
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from glovecal_models.takes.answer import ColumnMapping, TablePreview
+from glovecal_models.takes.joined_reference import join_references
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.table_preview import preview_table
 from glovecal_models.takes.take import Take as TakeArrays
-from glovecal_service.plain import document_of, read
+from glovecal_service.plain import document_of
 from glovecal_service.request_types import IDENTIFIER, SHA256, SubjectName, WearingName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
-from glovecal_service.rest.http.problem import Problem, change_problems
+from glovecal_service.rest.http.problem import change_problems
 from glovecal_service.rest.take.answer import ImportedTakes
 from glovecal_service.rest.take.import_takes import Import, import_takes
+from glovecal_service.rest.take.uploaded_files import (
+    READ_AS,
+    UploadedReadings,
+    UploadedReference,
+    kept_upload,
+    mapping_kept,
+    read_uploaded,
+)
 from glovecal_service.rest.take.uploads import (
-    FILE_NAME,
-    LONGEST_FILE_NAME,
     TABLE_BODY,
     FileName,
     TableFormat,
     file_name,
     keep_table,
 )
-from glovecal_service.store.list_part import ListPart
-from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/takes", tags=["takes"])
 
-READ_AS = "read_as"
-"""In a take's facts: the shape of the table it came from, and how that was read."""
+MOST_REFERENCES = 200
 
 
 class ImportedAs(BaseModel):
@@ -87,24 +92,18 @@ async def add_takes(
     upload = await keep_table(request, parts)
     files = [(file_name(filename, options.format), upload.path)]
     if options.reference_upload is not None:
-        files.append((file_name(reference_filename, None), _kept(parts, options.reference_upload)))
+        files.append((file_name(reference_filename, None), kept_upload(parts, options.reference_upload)))
     return await _imported(parts, response, files, upload.sha256, options)
 
 
-class UploadedTable(BaseModel):
-    """A table that was sent to `uploads`."""
+class UploadedTable(UploadedReadings):
+    """A table that was sent to `uploads`, and files with the angles that belong to it."""
 
-    model_config = ConfigDict(extra="forbid")  # strict would take no list as columns
-
-    upload: str = Field(pattern=SHA256)
-    filename: str = Field(
-        pattern=FILE_NAME, max_length=LONGEST_FILE_NAME, description="What the user calls it."
-    )
-    mapping: ColumnMapping | None = Field(
-        None,
-        description="How it is read. None: as a take table, else as it was guessed or kept.",
-    )
     wearing: WearingName | None = Field(None, description="The wearing, where the file does not say it.")
+    references: list[UploadedReference] = Field(
+        default_factory=list, max_length=MOST_REFERENCES,
+        description="Files with the angles of its takes: each take is joined with the one that fits.",
+    )  # fmt: skip
 
 
 class ImportedUpload(ImportedAs, UploadedTable):
@@ -120,13 +119,15 @@ class ImportedUpload(ImportedAs, UploadedTable):
 async def preview(body: UploadedTable, parts: PartsNeeded) -> TablePreview:
     """Nothing is imported. A table of a shape that was imported before is read as it was then; 422 for what
     is no table of numbers."""
-    path = _kept(parts, body.upload)
+    path = kept_upload(parts, body.upload)
 
     def look() -> TablePreview:
+        references = [read_uploaded(parts, each).rows for each in body.references]
         with parts.uploads.under_names((body.filename, path)) as [named]:
             return preview_table(
-                named, body.mapping, wearing=body.wearing, kept=partial(_mapping_kept, parts.store)
-            )
+                named, body.mapping, wearing=body.wearing, kept=partial(mapping_kept, parts.store),
+                references=references,
+            )  # fmt: skip
 
     return await anyio.to_thread.run_sync(look, limiter=parts.import_slots)
 
@@ -141,24 +142,8 @@ async def preview(body: UploadedTable, parts: PartsNeeded) -> TablePreview:
 )
 async def import_upload(body: ImportedUpload, response: Response, parts: PartsNeeded) -> dict[str, Any]:
     """As `POST /v1/takes` does with a take table. How it was read is kept for the next file of its shape."""
-    files = [(body.filename, _kept(parts, body.upload))]
-    return await _imported(parts, response, files, body.upload, body, body.mapping)
-
-
-def _kept(parts: Parts, upload: str) -> Path:
-    found = parts.uploads.find(upload)
-    if found is None:
-        raise Problem(404, "not-found", f"there is no upload {upload}")
-    return found
-
-
-def _mapping_kept(store: Store, shape: str) -> ColumnMapping | None:
-    """As a table of this shape was read last."""
-    for record in store.takes.list(part=ListPart(reverse=True, text=shape)):
-        kept = record.facts.get(READ_AS)
-        if kept is not None and kept["shape"] == shape:
-            return read(ColumnMapping, kept["mapping"])
-    return None
+    files = [(body.filename, kept_upload(parts, body.upload))]
+    return await _imported(parts, response, files, body.upload, body, body.mapping, body.references)
 
 
 async def _imported(
@@ -168,9 +153,10 @@ async def _imported(
     original_sha256: str,
     options: ImportedAs,
     mapping: ColumnMapping | None = None,
+    references: Sequence[UploadedReference] = (),
 ) -> dict[str, Any]:
     result = await anyio.to_thread.run_sync(
-        _import, parts, files, original_sha256, options, mapping, limiter=parts.import_slots
+        _import, parts, files, original_sha256, options, mapping, references, limiter=parts.import_slots
     )
     parts.metrics.imported_takes.inc(len(result.imported))
     response.status_code = 201 if result.imported or result.replaced else 200
@@ -192,6 +178,7 @@ def _import(
     original_sha256: str,
     options: ImportedAs,
     mapping: ColumnMapping | None,
+    references: Sequence[UploadedReference],
 ) -> Import:
     facts = None
     if mapping is not None:
@@ -199,10 +186,14 @@ def _import(
     with parts.uploads.under_names(*files) as paths:
 
         def takes() -> list[TakeArrays]:
-            return read_takes(
+            readings = read_takes(
                 *paths, name=options.name, wearing=options.wearing, equal_times=options.equal_times,
                 mapping=mapping,
             )  # fmt: skip
+            if not references:
+                return readings
+            rows = [read_uploaded(parts, each).rows for each in references]
+            return [each.take for each in join_references(readings, rows)]
 
         return import_takes(
             parts.store,

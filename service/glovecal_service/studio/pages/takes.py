@@ -3,42 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from pathlib import PurePosixPath
 
 from nicegui import ui
-from nicegui.elements.mixins.text_element import TextElement
 
-from glovecal_models.presentation.document import counted, first_of
-from glovecal_models.takes.answer import ColumnMapping, MappedColumn, Role, TablePreview, of_takes
-from glovecal_service.plain import document_of
-from glovecal_service.rest.take.answer import ImportedTakes
-from glovecal_service.studio.chosen import Chosen
-from glovecal_service.studio.drop import Uploaded, files_of
-from glovecal_service.studio.heading import heading, main_act
+from glovecal_models.takes.answer import TablePreview
+from glovecal_service.rest.take.answer import CardTable, Take, UploadKind
+from glovecal_service.studio.drop import Uploaded, files_of, imported_model
+from glovecal_service.studio.pages.dropped_calibration import DroppedCalibration
+from glovecal_service.studio.pages.dropped_reference import DroppedReference
+from glovecal_service.studio.pages.dropped_tables import FilesOfOneShape, uploaded
 from glovecal_service.studio.pages.takes_table import TakesTable
 from glovecal_service.studio.pages.train_panel import TrainPanel
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import Around, page, shell
 from glovecal_service.studio.studio import Studio
-from glovecal_service.studio.table import row_head, table
-
-ROLE_NAMES: dict[Role, str] = {
-    "time": "time", "take": "take", "wearing": "wearing", "pose": "pose", "sensor": "sensor",
-    "rotation": "measured angle", "deviation": "deviation of an angle", "context": "context",
-    "ignored": "left out",
-}  # fmt: skip
-UNITS: dict[str, dict[str, str]] = {
-    "time": {"s": "s", "ms": "ms", "us": "µs", "ns": "ns", "date": "date"},
-    "rotation": {"deg": "degrees", "rad": "radians"},
-    "deviation": {"deg": "degrees", "rad": "radians"},
-}
-LISTED: dict[Role, str] = {"sensor": "Sensors", "rotation": "Measured angles", "ignored": "Left out"}
-NAMED = ("sensor", "rotation", "deviation", "context")
-USUAL_NAME = "me"
-"""Of a wearer nobody has named yet."""
-MOST_SHOWN = 24
 
 
 def add(studio: Studio) -> None:
@@ -48,202 +28,109 @@ def add(studio: Studio) -> None:
     async def takes(files: str = "") -> None:
         async with shell(studio, "takes", "Takes") as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
-            await TakesPage(studio).build(around, files_of(files))
+            await TakesPage(studio, around).build(files_of(files))
 
 
 class TakesPage:
     """One open page."""
 
-    def __init__(self, studio: Studio) -> None:
+    def __init__(self, studio: Studio, around: Around) -> None:
         self._studio = studio
+        self._around = around
 
-    async def build(self, around: Around, files: Sequence[Uploaded]) -> None:
+    async def build(self, files: Sequence[Uploaded]) -> None:
         with ui.element("section").classes("card drop-card").props('aria-label="Add takes"'):
             ui.label(
-                "Drop recordings of a glove anywhere on this page: CSV, text or Parquet tables of any "
-                "program. What they are is shown before anything is kept."
+                "Drop files anywhere on this page: recordings of a glove, as tables of any program (CSV, "
+                "text, Parquet) or from its memory card; angles that another system measured (a table, "
+                "TRC, BVH); calibrations of other programs, models. What they are is shown before anything "
+                "is kept."
             )
-            around.drop.button("Choose files").props("outline no-caps").classes("studio-target")
+            self._around.drop.button("Choose files").props("outline no-caps").classes("studio-target")
         self._found = ui.element("div").classes("findings").props('aria-live="polite"')
         self._train = TrainPanel(self._studio)
         if files:  # what is to be trained are these, once they are imported
-            await self._look(files, around.chosen)
+            self._around.drop.waiting = files
+            await self._look(files)
         else:
-            await self._train.build(await around.chosen.takes(self._studio.service))
+            await self._train.build(await self._around.chosen.takes(self._studio.service))
             await TakesTable(self._studio.service).build()
 
-    async def _look(self, files: Sequence[Uploaded], about: Chosen) -> None:
+    async def _look(self, files: Sequence[Uploaded]) -> None:
+        shapes: dict[str, list[tuple[Uploaded, TablePreview]]] = {}
+        references: list[DroppedReference] = []
+        readings: list[FilesOfOneShape] = []
+        about = self._around.chosen
         with self._found:
-            shapes: dict[str, list[tuple[Uploaded, TablePreview]]] = {}
             for file in files:
                 try:
-                    seen = await self._studio.service.ask(TablePreview, "/takes/preview", _body(file))
+                    match (await self._studio.service.read(UploadKind, f"/uploads/{file[0]}/kind")).kind:
+                        case "calibration":
+                            await DroppedCalibration(self._studio, file, self._imported_model).build(about)
+                        case "model":
+                            sentence = await imported_model(self._studio.service, file)
+                            ui.label(sentence).classes("finding-sentence").props('role="status"')
+                        case "motion":
+                            references.append(DroppedReference(self._studio, file, self._attached))
+                        case "card":
+                            readings.append(await self._card(file))
+                        case _:
+                            seen = await self._studio.service.ask(
+                                TablePreview, "/takes/preview", uploaded(file)
+                            )
+                            if seen.is_reference:
+                                references.append(DroppedReference(self._studio, file, self._attached, seen))
+                            else:
+                                shapes.setdefault(seen.mapping.shape, []).append((file, seen))
                 except Refusal as refusal:
-                    ui.label(str(refusal)).classes("studio-problem").props('role="alert"')
-                else:
-                    shapes.setdefault(seen.mapping.shape, []).append((file, seen))
-            for alike in shapes.values():
-                await FilesOfOneShape(self._studio, alike, self._train.take_on).build(about)
+                    _problem(file, str(refusal))
+            readings += [FilesOfOneShape(self._studio, alike, self._imported) for alike in shapes.values()]
+            for each in readings:
+                await each.build(about)
+            unmeasured = [each for each in readings if each.is_unmeasured]
+            shown: list[DroppedReference] = []
+
+            async def joined() -> None:
+                for each in unmeasured:
+                    await each.join([reference.body for reference in shown])
+
+            for each in references:
+                with refusals(partial(_problem, each.file)):
+                    await each.build(about, joined=joined if unmeasured else None)
+                    shown.append(each)
+        if shown and unmeasured:
+            await joined()
+
+    async def _card(self, file: Uploaded) -> FilesOfOneShape:
+        card = await self._studio.service.ask(CardTable, f"/uploads/{file[0]}/card")
+        named = card.sha256, f"{PurePosixPath(file[1]).stem}.csv"
+        seen = await self._studio.service.ask(TablePreview, "/takes/preview", uploaded(named))
+        return FilesOfOneShape(
+            self._studio, [(named, seen)], self._imported, note=card.sentence, layout=card.layout
+        )
+
+    async def _imported(
+        self, subject: str, layout: str, takes: Sequence[str], files: Sequence[Uploaded]
+    ) -> None:
+        await self._no_longer_waiting(files, subject)
+        await self._train.take_on(subject, layout, takes)
+
+    async def _attached(self, take: Take, file: Uploaded) -> None:
+        await self._no_longer_waiting([file], take.subject)
+        await self._train.take_on(take.subject, take.layout, [take.id])
+
+    async def _imported_model(self, subject: str, file: Uploaded) -> None:
+        await self._no_longer_waiting([file], subject)
+
+    async def _no_longer_waiting(self, files: Sequence[Uploaded], subject: str) -> None:
+        drop = self._around.drop
+        drop.waiting = [file for file in drop.waiting if file not in files]
+        await self._around.is_now_about(subject)
 
 
-class FilesOfOneShape:
-    """Files that are read alike: what they are, their columns, and one button that imports them."""
-
-    def __init__(self, studio: Studio, files: Sequence[tuple[Uploaded, TablePreview]], imported: Any) -> None:
-        self._studio = studio
-        self._imported = imported
-        self._files = [file for file, _ in files]
-        self._seen = [seen for _, seen in files]
-        self._is_corrected = False
-
-    @property
-    def _mapping(self) -> ColumnMapping:
-        return self._seen[0].mapping
-
-    async def build(self, about: Chosen) -> None:
-        self._place = ui.element("section").classes("finding finding-named")
-        self._place.props["aria-label"] = f"Preview of {first_of([seen.file for seen in self._seen], 3)}"
-        with self._place:
-            self._title = heading(2, "")
-            self._sentence = ui.label("").classes("finding-sentence").props('role="status"')
-            self._facts = ui.element("div")
-            with ui.row().classes("choices"):
-                self._subject = ui.input(
-                    "Whose takes",
-                    value=USUAL_NAME if about.is_simulated else about.person or USUAL_NAME,
-                    autocomplete=list(about.people),
-                )
-                self._act = main_act("Import", self._import)
-            with ui.expansion("Columns: how they are read").classes("preview-columns") as self._columns:
-                pass
-            with ui.expansion("Takes").classes("preview-takes") as self._takes:
-                pass
-        self._show(columns=True)
-
-    def _show(self, *, columns: bool) -> None:
-        """``columns``: also the table in which they are corrected, which would lose its focus."""
-        first, takes = self._seen[0], [take for seen in self._seen for take in seen.takes]
-        problem = next((seen.problem for seen in self._seen if seen.problem), None)
-        names = [seen.file for seen in self._seen]
-        self._title.set_text(names[0] if len(names) == 1 else f"{len(names)} files: {first_of(names, 3)}")
-        self._sentence.set_text(first.sentence if len(names) == 1 or problem else of_takes(takes))
-        self._act.set_text(f"Import {counted(len(takes), 'take')}")
-        self._act.set_enabled(problem is None and bool(takes))
-        self._facts.clear()
-        with self._facts:
-            if problem:
-                ui.label(problem).classes("studio-problem").props('role="alert"')
-            for role, words in LISTED.items():
-                named = [item.name or item.header for item in self._mapping.of(role)]
-                if any(named):
-                    ui.label(f"{words}: {first_of(list(filter(None, named)), MOST_SHOWN)}.")
-            [time] = self._mapping.of("time")[:1] or [None]
-            if time is not None:
-                ui.label(f"Time: {time.header}, in {UNITS['time'].get(time.unit, time.unit)}.")
-            if first.is_kept:
-                ui.label("Read as the last file with these columns was.")
-            for sentence in dict.fromkeys(sentence for seen in self._seen for sentence in seen.odd):
-                ui.label(sentence).classes("take-warning")
-        self._takes.clear()
-        with (
-            self._takes,
-            table(f"Takes of {names[0]}", ("Take", "Wearing", "Length", "Frames", "Rate", "Measured")),
-        ):
-            for take in takes:
-                with ui.element("tr"):
-                    row_head(take.name)
-                    rate = "–" if take.rate_hz is None else f"{take.rate_hz:.1f} Hz"
-                    for text in (
-                        take.wearing or "–", f"{take.duration_s:.1f} s", str(take.frames), rate,
-                        first_of(take.rotations, 6) or "nothing",
-                    ):  # fmt: skip
-                        TextElement(tag="td", text=text)
-        if columns:
-            self._columns.clear()
-            with self._columns:
-                self._correct()
-
-    def _correct(self) -> None:
-        heads = ("Column", "First cells", "Read as", "Name", "Unit", "Because")
-        with table(f"Columns of {self._seen[0].file} and how they are read", heads):
-            for at, item in enumerate(self._mapping.columns):
-                with ui.element("tr"):
-                    row_head(item.header or f"column {at + 1}")
-                    cells = ", ".join(row[at] for row in self._seen[0].rows[:3] if at < len(row))
-                    TextElement(tag="td", text=cells)
-                    with ui.element("td"):
-                        field = ui.select(ROLE_NAMES, value=item.role, on_change=partial(self._role, at))
-                        _called(field, f"What {item.header} is")
-                    with ui.element("td"):
-                        if item.role in NAMED:
-                            field = ui.input(value=item.name, on_change=partial(self._name, at))
-                            _called(field.props("debounce=600"), f"Name of {item.header}")
-                    with ui.element("td"):
-                        if item.role in UNITS:
-                            units = UNITS[item.role]
-                            field = ui.select(units, value=item.unit, on_change=partial(self._unit, at))
-                            _called(field, f"Unit of {item.header}")
-                    TextElement(tag="td", text=item.why)
-
-    async def _role(self, at: int, event: Any) -> None:
-        role = cast(Role, event.value)
-        old = self._mapping.columns[at]
-        unit = old.unit if old.unit in UNITS.get(role, {}) else next(iter(UNITS.get(role, {"": ""})))
-        name = old.name if role in NAMED else ""
-        new = replace(old, role=role, unit=unit, name=name, why="corrected")
-        await self._changed(at, new, columns=True)
-
-    async def _name(self, at: int, event: Any) -> None:
-        await self._changed(at, replace(self._mapping.columns[at], name=event.value.strip()), columns=False)
-
-    async def _unit(self, at: int, event: Any) -> None:
-        await self._changed(at, replace(self._mapping.columns[at], unit=event.value), columns=False)
-
-    async def _changed(self, at: int, column: MappedColumn, *, columns: bool) -> None:
-        every = list(self._mapping.columns)
-        every[at] = column
-        mapping = replace(self._mapping, columns=tuple(every))
-        with refusals():
-            self._seen = [
-                await self._studio.service.ask(TablePreview, "/takes/preview", _body(file) | _as(mapping))
-                for file in self._files
-            ]
-            self._is_corrected = True
-            self._show(columns=columns)
-
-    async def _import(self) -> None:
-        self._act.disable()
-        takes, warnings, layout = [], [], ""
-        try:
-            for file, seen in zip(self._files, self._seen, strict=True):
-                body = _body(file) | {
-                    "subject": self._subject.value, "create_subject": True, "equal_times": seen.equal_times,
-                    **({} if seen.is_take_table and not self._is_corrected else _as(seen.mapping)),
-                }  # fmt: skip
-                found = await self._studio.service.ask(ImportedTakes, "/takes/import", body)
-                takes += found.takes
-                warnings += found.warnings
-                layout = found.layout
-        except Refusal as refusal:
-            ui.notify(str(refusal), type="warning", timeout=10_000)
-            self._act.enable()  # what is here already is not imported twice
-            return
-        self._place.clear()
-        with self._place:
-            heading(2, f"{counted(len(takes), 'take')} imported")
-            for sentence in dict.fromkeys(warnings):
-                ui.label(sentence).classes("take-warning")
-        await self._imported(takes[0].subject, layout, [take.id for take in takes])
+def _problem(file: Uploaded, sentence: str) -> None:
+    ui.label(_of_file(file, sentence)).classes("studio-problem").props('role="alert"')
 
 
-def _called(field: ui.element, name: str) -> None:
-    """For screen readers; a file's own words are never parsed as properties."""
-    field.props("dense").props["aria-label"] = name
-
-
-def _body(file: Uploaded) -> dict[str, Any]:
-    return {"upload": file[0], "filename": file[1]}
-
-
-def _as(mapping: ColumnMapping) -> dict[str, Any]:
-    return {"mapping": document_of(mapping)}
+def _of_file(file: Uploaded, sentence: str) -> str:
+    return sentence if sentence.startswith(file[1]) else f"{file[1]}: {sentence}"

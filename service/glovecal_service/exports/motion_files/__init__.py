@@ -1,0 +1,1 @@
+"""Motion that another program recorded (TRC, BVH), and tables of angles: the reference of a take."""
