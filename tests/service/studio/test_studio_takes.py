@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from dropping import drop
 from foreign_tables import SHAPES, laboratory, logger, semicolons
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, FloatRect, Locator, Page, expect
 from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
@@ -186,6 +186,13 @@ def hand_of(page: Page) -> int:
     return int(page.locator(".take-hand").get_attribute("id").removeprefix("c"))  # pyright: ignore
 
 
+def box_of(what: Locator) -> FloatRect:
+    """Where it is on the page."""
+    box = what.bounding_box()
+    assert box is not None
+    return box
+
+
 def stand_at(page: Page, seconds: float) -> list[float]:
     """Move the slider there; where the index finger's tip is then."""
     slider = page.get_by_role("slider", name="Moment of the take")
@@ -213,19 +220,19 @@ def test_the_hand_of_a_take_is_replayed_in_step_with_its_curves(opened: Open, cl
     places, lines = [], []
     for at in (straight, bent):
         places.append(stand_at(page, round(20 * at) / 20))
-        lines.append(line.bounding_box())
+        lines.append(box_of(line))
     assert abs(places[0][0] - places[1][0]) > 40, "a bent finger's tip is nearer to the wrist"
     assert (lines[0]["x"] < lines[1]["x"]) == (straight < bent)
     stand_at(page, 0.0)
-    began = line.bounding_box()["x"]
+    began = box_of(line)["x"]
     page.get_by_label("Speed").select_option("4")
     page.get_by_role("button", name="Play").click()
     page.wait_for_function("document.querySelector('.take-replay .replay-slider').value > 4")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Play", exact=True).wait_for()
-    assert line.bounding_box()["x"] > began + 100
+    assert box_of(line)["x"] > began + 100
     at = page.get_by_role("slider", name="Moment of the take")
-    plot = page.locator(".take-plot").bounding_box()
+    plot = box_of(page.locator(".take-plot"))
     page.mouse.click(plot["x"] + 0.5 * plot["width"], plot["y"] + 60)
     expect(at).to_have_attribute("aria-valuetext", re.compile(r"^[456]\.\d\d of"))
     assert serious(page) == []
@@ -249,7 +256,7 @@ def test_a_stretch_is_left_out_and_used_again(opened: Open, client: RestClient) 
 
     plot = page.locator(".take-plot")
     plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
+    box = box_of(plot)
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 70, steps=4)
@@ -303,7 +310,7 @@ def test_a_stretch_is_left_out_by_touch_on_a_phone(
     page.get_by_text(f"Measured: {len(take['rotations'])} rotations; all others rest.").wait_for()
     plot = page.locator(".take-plot")
     plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
+    box = box_of(plot)
     page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + 60)
     at = page.get_by_role("slider", name="Moment of the take")
     expect(at).not_to_have_attribute("aria-valuetext", re.compile(r"^0\.00 of"))
