@@ -17,12 +17,15 @@ from glovecal_models.calibration.samples import Samples, gather_samples
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.takes.take import Take
 
-FEWEST_TO_CHOOSE = 4
+FEWEST_TO_CHOOSE = 5
 """Sensors; a process over fewer is fast enough to be given all."""
 MOST_TRIED = 16
 """Sensors beside one another: those that explain most by themselves."""
 WORTH_ONE_MORE = 0.02
 """Share of the left-out error that one more sensor has to take away."""
+MOST_UNEXPLAINED = 0.2
+"""Share of the variance that the chosen sensors may leave: where takes differ by more than noise, as with a
+clock that is off, the choice would be of the fault."""
 FOLDS = 3
 FEWEST_FOR_A_CHOICE = 300
 """With fewer the map of a sensor that tells nothing can win."""
@@ -57,6 +60,8 @@ def _chosen(item: Correspondence, takes: Sequence[Take]) -> Correspondence:
         if more[best] > (1.0 - WORTH_ONE_MORE) ** 2 * left:
             break
         kept, left = [*kept, best], more[best]
+    if left > MOST_UNEXPLAINED * error.variance:
+        return item
     names = tuple(name for at, name in enumerate(item.sensors) if at in kept)
     return replace(item, sensors=names, kind="1S1R" if len(names) == 1 else "MS1R")
 
@@ -79,6 +84,10 @@ class _LeftOutError:
         inputs = (rows.inputs - rows.inputs.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
         folds = folds_over_takes(rows.take, FOLDS)
         return cls(inputs, rows.target - rows.target.mean(), tuple(fold.held_out for fold in folds))
+
+    @property
+    def variance(self) -> float:
+        return float(np.var(self.target))
 
     def of_sensors(self, sensors: Sequence[int]) -> float:
         x = self.inputs[:, sensors]

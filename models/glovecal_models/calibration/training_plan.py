@@ -52,8 +52,7 @@ class UsableSensors:
     """What is left of a layout. The glove still sends all its sensors: only what is read of them changes."""
 
     layout: Layout
-    """The same sensors; rotations are read from those that live, and where nobody said which from those that
-    explain them (``chosen_inputs``)."""
+    """The same sensors; rotations are read from those that live."""
     dead: tuple[DeadSensor, ...]
     """Of the sensors that some rotation was read from."""
     unreadable: tuple[str, ...]
@@ -69,12 +68,8 @@ def usable_sensors(layout: Layout, takes: Sequence[Take]) -> UsableSensors:
     reduced = [_reduced(item, dead) for item in layout.correspondences]
     read = {name for item in layout.correspondences for name in item.sensors}
     kept = (now or before for now, before in zip(reduced, layout.correspondences, strict=True))
-    living = replace(layout, correspondences=tuple(kept)) if dead & read else layout
-    unassigned = [
-        item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)
-    ]
     return UsableSensors(
-        with_chosen_inputs(living, unassigned, takes),
+        replace(layout, correspondences=tuple(kept)) if dead & read else layout,
         tuple(item for item in found if item.sensor in read),
         tuple(name for name, now in zip(layout.rotations, reduced, strict=True) if now is None),
     )
@@ -128,15 +123,21 @@ def plan_training(
 
     A rotation that no take measured is left out of the model, unless the layout gives it a rule whose
     rotations are trained; so is one that was held at a single angle, as when a sampling was stopped early.
-    Sensors that are dead or clipped are not read, and a rotation that has no other is left out.
+    Sensors that are dead or clipped are not read, and a rotation that has no other is left out. A process for
+    a rotation that is read from every sensor is given those that explain it (``chosen_inputs``).
     """
     settings = settings or TrainingSettings()
     if settings.method not in METHODS:
         raise NotTrainable(f"unknown method {settings.method!r}; {did_you_mean(settings.method, METHODS)}")
     usable = usable_sensors(layout, takes)
+    unassigned = [
+        item.rotation for item in layout.correspondences if set(item.sensors) == set(layout.sensors)
+    ]
     if settings.keep_dead:
         usable = UsableSensors(layout, (), ())
     layout = usable.layout
+    if settings.method not in LINEAR_METHODS:
+        layout = with_chosen_inputs(layout, unassigned, takes)
     tasks: list[FitTask] = []
     chosen: dict[str, Correspondence] = {}
     ranges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
