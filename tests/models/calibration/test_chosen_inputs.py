@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from foreign_tables import takes as foreign_takes
 
-from glovecal_models.calibration.chosen_inputs import with_chosen_inputs
-from glovecal_models.calibration.training_plan import plan_training
+from glovecal_models.calibration.training_plan import plan_training, with_chosen_inputs
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
