@@ -135,6 +135,7 @@ class _Loop:
             self.takes, self.layout, self.subject, replace(self.settings, folds=0),
             take_hashes=self.hashes, cancelled=self.cancelled,
         )  # fmt: skip
+        self.usable = replace(self.usable, layout=model.layout)  # what the base is read from stays
         self.settings = settings_of(model, self.settings)
         self._say("measuring the base on held-out takes", 0.1)
         self.errors = self._held_out(model)

@@ -143,7 +143,9 @@ def _asr_sign(sensor: str) -> float:
 def read_asr(text: str, counts: Counts, hand: Handedness) -> FoundLines:
     rows = [line for line in text.splitlines() if line.strip()]
     if len(rows) != len(ORDER):
-        raise BadInput(f"{len(rows)} lines; an ASR calibration has {len(ORDER)}, two points each")
+        raise BadInput(
+            f"{len(rows)} lines; {len(ORDER)} of two points each are expected in an ASR calibration"
+        )
     lines, left_out = {}, {}
     for number, (sensor, row) in enumerate(zip(ORDER, rows, strict=True), 1):
         points = [tuple(numbers(word.split(":"), f"line {number}")) for word in row.split()]

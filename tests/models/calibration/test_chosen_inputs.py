@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from foreign_tables import takes as foreign_takes
 
-from glovecal_models.calibration.chosen_inputs import with_chosen_inputs
-from glovecal_models.calibration.training_plan import usable_sensors
+from glovecal_models.calibration.training_plan import plan_training, with_chosen_inputs
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
@@ -28,7 +27,7 @@ def recorded(order: tuple[int, ...], count: int = 6, seconds: float = 10.0) -> l
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (3, 0, 4, 1, 2)])
 def test_the_sensor_of_each_rotation_is_among_few_whatever_their_numbers_say(order: tuple[int, ...]) -> None:
     layout = Layout.from_columns("any", PINS, JOINTS)
-    chosen = usable_sensors(layout, recorded(order)).layout
+    chosen = plan_training(recorded(order), layout, "any").layout
     for number, item in enumerate(chosen.correspondences):
         assert PINS[order.index(number)] in item.sensors
         assert len(item.sensors) <= 3
@@ -38,12 +37,12 @@ def test_the_sensor_of_each_rotation_is_among_few_whatever_their_numbers_say(ord
 def test_the_same_takes_give_the_same_sensors_and_what_was_said_stays() -> None:
     takes = recorded((0, 1, 2, 3, 4))
     layout = Layout.from_columns("any", PINS, JOINTS)
-    once = usable_sensors(layout, takes).layout
-    assert usable_sensors(once, takes).layout == once
+    once = plan_training(takes, layout, "any").layout
+    assert plan_training(takes, once, "any").layout == once
     said = Layout.from_document(
         {"name": "said", "sensors": list(PINS), "rotations": {name: list(PINS[:4]) for name in JOINTS}}
     )
-    assert usable_sensors(said, takes).layout is said
+    assert plan_training(takes, said, "any").layout is said
 
 
 def test_few_samples_choose_nothing() -> None:

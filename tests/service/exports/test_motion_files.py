@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.angles_of_points import named_points
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HAND_ROTATIONS, HANDS, Handedness
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.formats import FORMATS
 from glovecal_service.exports.hand_motion import HandMotion
+from glovecal_service.exports.motion_files.angles_of_points import named_points
 from glovecal_service.exports.motion_files.formats import motion_format
 from glovecal_service.exports.motion_files.reference_file import read_reference_file
 

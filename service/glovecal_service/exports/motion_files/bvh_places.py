@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.names import did_you_mean
 from glovecal_service.exports.body_markers import LONGEST_LINE, MOST_CELLS, BodyMarkers
 from glovecal_service.exports.bvh import MM_PER_UNIT
 
@@ -115,9 +116,13 @@ def _hierarchy(lines: _Lines) -> list[Bone]:
         elif word == "OFFSET" and bones:
             bones[-1].offset = np.array(lines.numbers(rest, 3))
         elif word == "CHANNELS" and bones:
-            _, *channels = rest.split()
-            if len(channels) > MOST_CHANNELS or not set(channels) <= {*TURNS, *SHIFTS}:
-                raise lines.problem(f"channels {rest[:60]!r}; known are {', '.join((*SHIFTS, *TURNS))}")
+            channels = rest.split()[1:]
+            if len(channels) > MOST_CHANNELS:
+                raise lines.problem(f"{len(channels)} channels; at most {MOST_CHANNELS} are expected")
+            for channel in channels:
+                if channel not in (*SHIFTS, *TURNS):
+                    near = did_you_mean(channel[:40], (*SHIFTS, *TURNS))
+                    raise lines.problem(f"no channel {channel[:40]!r}; {near}")
             bones[-1].channels = tuple(channels)
         else:
             raise lines.problem(f"{line[:40]!r} is nothing that a skeleton has; {RIGHT}")

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.angles_of_points import HandAngles, angles_of_points, named_points
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS, Handedness
 from glovecal_models.presentation.document import first_of
 from glovecal_models.takes.answer import ColumnMapping
 from glovecal_models.takes.joined_reference import ReferencesByTake
 from glovecal_models.takes.table import ReferenceRows, read_reference
 from glovecal_service.exports.body_markers import BodyMarkers
+from glovecal_service.exports.motion_files.angles_of_points import HandAngles, angles_of_points, named_points
 from glovecal_service.exports.motion_files.formats import motion_format
 
 FAR_OUTSIDE_DEG = 30.0
