@@ -23,7 +23,7 @@
                             fresh trixie -- tests/client: these tests only)
     python3 do.py containers  both container images built, run, killed and upgraded (needs podman;
                             --debootstrap where no image registry is reached; half an hour)
-    python3 do.py picture   README's picture of the studio, from the running page (needs Chromium)
+    python3 do.py picture   pictures of the studio for README and docs/, from running pages (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched
 but the caches of pip and uv. Where only another Python is found, uv brings one into .tools.
@@ -228,7 +228,7 @@ def study(arguments: list[str]) -> int:
 
 
 def picture(arguments: list[str]) -> int:
-    return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=STUDIO)
+    return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=(*STUDIO, *SIMULATED))
 
 
 def fresh(arguments: list[str]) -> int:
