@@ -28,10 +28,13 @@ MOST_BYTES = 300_000
 EFFECT, SEED, SUBJECT, GLOVE = "hysteresis", 7, "pia", "right"
 TAKE_S, SMOKE_TAKE_S = 9.0, 5.0
 """Of longer takes, training would start worker processes."""
-PAGE: ViewportSize = {"width": 820, "height": 760}
+PAGE: ViewportSize = {"width": 1240, "height": 900}
+NARROW: ViewportSize = {"width": 820, "height": 760}
+"""Of the two pages that stand side by side in README's picture."""
 SHOWN_PX = 640
-"""Width of each of the two pages in README's picture."""
+"""Width of each of them there."""
 PATIENCE_MS = 300_000
+BESIDE = ("diagnose", "fall")
 QUIET = ".q-notification { display: none; } * { caret-color: transparent; }"
 
 
@@ -52,7 +55,7 @@ def main(arguments: list[str]) -> None:
             pictures |= Walk(page, f"{place.url}/studio").of_a_file(place.folder)
             with streaming(place, hidden, layout):
                 pictures["live"] = Walk(page, f"{place.url}/studio").of_a_hand()
-            pictures["studio"] = beside(browser, [pictures["diagnose"], pictures["fall"]])
+            pictures["studio"] = beside(browser, [pictures.pop(f"{name}-narrow") for name in BESIDE])
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in pictures.items():
             if len(content) > MOST_BYTES:
@@ -90,18 +93,19 @@ class Walk:
         self._open(f"compare?models={model}")
         page.locator(".stretch").first.click()
         page.locator(".hand-view canvas").first.wait_for()
+        page.evaluate("scrollTo(0, 0)")
         found = {"compare": self._still()}
         self._open(f"diagnose?model={model}")
         page.get_by_role("button", name="Diagnose", exact=True).click()
         add = page.get_by_role("button", name=f"Add {EFFECT}").first
         add.wait_for()
         expect(page.locator("#main").get_by_role("progressbar")).to_be_hidden(timeout=PATIENCE_MS)
-        found["diagnose"] = self._still()
+        found |= self._both("diagnose")
         add.click()
         page.get_by_role("link", name="See the error fall").last.click()
         expect(page.get_by_text("The error falls from").first).to_be_visible(timeout=PATIENCE_MS)
         page.locator("canvas").first.wait_for()
-        return found | {"fall": self._still()}
+        return found | self._both("fall")
 
     def of_a_file(self, folder: Path) -> dict[str, bytes]:
         """The ways in, what a dropped file is, and a take of it."""
@@ -130,6 +134,14 @@ class Walk:
         page.get_by_role("button", name="Raw").click()
         page.wait_for_timeout(6000)  # the strips of readings show the last six seconds
         return self._still()
+
+    def _both(self, name: str) -> dict[str, bytes]:
+        """For docs/, and narrow for README."""
+        found = {name: self._still()}
+        self._page.set_viewport_size(NARROW)
+        found[f"{name}-narrow"] = self._still()
+        self._page.set_viewport_size(PAGE)
+        return found
 
     def _open(self, name: str) -> None:
         self._page.goto(f"{self._studio}/{name}")

@@ -160,6 +160,11 @@ class TakeRecord:
         )
 
     @property
+    def note(self) -> str:
+        """What people want to remember of it."""
+        return str(self.facts.get(NOTE, ""))
+
+    @property
     def left_out(self) -> tuple[Stretch, ...]:
         """Stretches that people left out, in seconds since its first frame, the newest last."""
         return tuple((low, high) for low, high in self.facts.get(LEFT_OUT, ()))
@@ -199,7 +204,7 @@ def incomplete_sentences(takes: Iterable[TakeRecord]) -> list[str]:
 
 
 REMOVED, NAME, NOTE = "removed_at", "name", "note"
-"""Facts that people give a model."""
+"""Facts that people give a model; a take's note too."""
 
 
 @dataclass(frozen=True)

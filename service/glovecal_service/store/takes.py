@@ -23,7 +23,7 @@ from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.gloves import latency_of_take
 from glovecal_service.store.list_part import WHOLE, ListPart
-from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, TakeRecord
+from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, NOTE, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
@@ -45,6 +45,7 @@ AS_SHOWN_S = 0.006
 
 _SEARCHED = (
     "^id", "name", "subject", "wearing", "layout", "source", "^original_sha256", "^facts.read_as.shape",
+    "facts.note",
 )  # fmt: skip
 
 
@@ -226,6 +227,10 @@ class Takes:
                 raise Conflict(f"take {id} was changed or removed meanwhile; look at it again")
             return _require(connection, id)
 
+    def describe(self, id: str, *, note: str) -> TakeRecord:
+        """What people want to remember of it; "" for nothing. Raises NotFound."""
+        return self._with_facts(id, lambda facts: {NOTE: note})
+
     def leave_out(self, id: str, stretch: Stretch) -> TakeRecord:
         """Leave frames and reference between two times, seconds since its first frame, out of all work with
         the take; what is stored of it stays.
@@ -267,10 +272,14 @@ class Takes:
         return self._note_left_out(id, lambda now: [each for each in now if each != alike[-1]])
 
     def _note_left_out(self, id: str, change: Callable[[tuple[Stretch, ...]], list[Stretch]]) -> TakeRecord:
+        def changed(facts: dict[str, Any]) -> dict[str, Any]:
+            return {LEFT_OUT: change(tuple((low, high) for low, high in facts.get(LEFT_OUT, ())))}
+
+        return self._with_facts(id, changed)
+
+    def _with_facts(self, id: str, new: Callable[[dict[str, Any]], dict[str, Any]]) -> TakeRecord:
         def changed(row: dict[str, Any]) -> dict[str, Any]:
-            facts = row["facts"]
-            now = tuple((low, high) for low, high in facts.get(LEFT_OUT, ()))
-            return {"facts": {**facts, LEFT_OUT: change(now)}}
+            return {"facts": {**row["facts"], **new(row["facts"])}}
 
         with self._database.write() as connection:
             change_rows(connection, tables.takes, tables.takes.c.id == id, changed)

@@ -57,7 +57,7 @@ def test_the_fall_goes_over_simpler_calibrations_and_both_hands_are_replayed(
     fall = httpx.get(f"{address}/v1/models/{child['id']}/fall", timeout=60).json()
     page = opened(f"fall?model={child['id']}").page
     expect(page.locator(".fall canvas")).to_be_visible()
-    assert document(page, ".fall") == fall
+    assert document(page, ".fall") == {"steps": fall["steps"], "floor": fall["floor"]}
     line = httpx.get(f"{address}/v1/models/{child['id']}/lineage").json()
     assert [step["model"] for step in fall["steps"] if step["model"]] == [each["id"] for each in line[::-1]]
     assert fall["floor"]["low_deg"] <= fall["floor"]["floor_deg"] <= fall["floor"]["high_deg"]

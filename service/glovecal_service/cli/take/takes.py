@@ -99,6 +99,7 @@ def _facts(found: CheckView) -> dict[str, Any]:
         "added": take.created_at,
         "frames": f"{take.frames} in {take.duration_s:.2f} s",
         **({"pre-roll": f"{found.pre_roll_frames} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
+        **({"note": take.note} if take.note else {}),
         **({"left out": _left_out(take)} if take.left_out else {}),
         "state": take.state,
         **({} if sent is None else {"frames sent": sent}),
@@ -201,6 +202,16 @@ def use_layout(
         for row in wanted:
             service.put(f"/takes/{row.id}/layout", {"layout": layout})
     out.print(f"Read by layout {layout} from now on: {', '.join(row.name for row in wanted) or 'no take'}.")
+
+
+@app.command("note")
+def note(
+    take: Take, text: Annotated[str, typer.Argument(help='What is to be remembered; "" for nothing.')]
+) -> None:
+    """Note something of a take; the page Takes finds its words."""
+    with connect() as service:
+        row = read(TakeRow, service.put(f"/takes/{_id(service, take)}/note", {"note": text}))
+    out.print(f"Take {row.name}: {row.note or 'no note'}.", highlight=False)
 
 
 @app.command("leave-out")

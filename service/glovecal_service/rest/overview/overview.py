@@ -107,8 +107,8 @@ def _of_model(store: Store, models: Sequence[ModelRecord], active: set[str]) -> 
     if better := _better_versions(model, models):
         version = better[-1]
         fall = NextStep(
-            sentence=f"Version {version.id[:SHORT]} of it errs by {_error(version):.2f} degrees, "
-            f"{short} by {_error(model):.2f}.",
+            sentence=f"Model {short} of {model.subject} errs by {_error(model):.2f} degrees, its version "
+            f"{version.id[:SHORT]} by {_error(version):.2f}.",
             command=f"glovecal model activate {version.id[:SHORT]}", page=f"fall?model={version.id}",
             label="See the error fall",
         )  # fmt: skip

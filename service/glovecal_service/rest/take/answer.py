@@ -41,6 +41,7 @@ class Take(Row):
         description="By a person, from training, comparison and diagnosis: from and to in seconds since its "
         "first frame, the newest last."
     )
+    note: str = Field(description="What people want to remember of it.")
     simulated: bool
     recording: str | None
     state: Literal["complete", "repairing"] = Field(

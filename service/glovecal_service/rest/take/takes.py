@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse
@@ -15,7 +15,7 @@ from starlette.background import BackgroundTask
 from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_models.takes.take_check import check_take
 from glovecal_models.takes.write_table import write_takes
-from glovecal_service.plain import plain
+from glovecal_service.plain import plain, plain_text
 from glovecal_service.request_types import Identifier, StrictBody
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.list_part import PartWanted, tell_rest
@@ -78,6 +78,18 @@ def put_layout(id: IdInPath, body: TakeLayout, store: StoreNeeded) -> TakeRecord
     """Frames and reference stay as they are; models that were trained on the take stay what they are. 422
     when the take lacks a sensor of the layout."""
     return store.takes.use_layout(id, store.layouts.get(body.layout))
+
+
+class TakeNote(StrictBody):
+    note: Annotated[str, Field(max_length=2000)]
+
+
+@router.put(
+    "/{id}/note", response_model=Take, summary="Note something of a take", responses=change_problems()
+)
+def put_note(id: IdInPath, body: TakeNote, store: StoreNeeded) -> TakeRecord:
+    """What people want to remember of it; lists find its words. Empty: nothing."""
+    return store.takes.describe(id, note=plain_text(body.note))
 
 
 class LeftOut(StrictBody):

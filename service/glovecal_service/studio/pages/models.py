@@ -93,8 +93,10 @@ class ModelsPage:
             article.props["data-model"] = model.id
             with ui.row().classes("version-row"):
                 ui.label(model.short).classes("version-id")
-                field = ui.input("Name", value=model.name).props("dense")
-                field.on("blur", partial(self._name, model, field), args=[])
+                name = ui.input("Name", value=model.name).props("dense")
+                note = ui.input("Note", value=model.note).props("dense")
+                for field in (name, note):
+                    field.on("blur", partial(self._describe, model, name, note), args=[])
                 ui.label(made_of(model))
                 ui.label(f"held-out error {degrees(model.held_out_rmse_deg)}").classes("version-error")
                 if model.rmse_unseen_wearing_deg is not None:
@@ -116,9 +118,9 @@ class ModelsPage:
     async def _activate(self, model: str) -> None:
         await self._do(f"/models/{model}/activate", {}, "Live poses come from this model now.")
 
-    async def _name(self, model: Model, field: ui.input) -> None:
+    async def _describe(self, model: Model, name: ui.input, note: ui.input) -> None:
         with refusals():
-            body = {"name": (field.value or "").strip(), "note": model.note}
+            body = {"name": (name.value or "").strip(), "note": (note.value or "").strip()}
             await self._studio.service.put(f"/models/{model.id}/name", body)
 
     async def _report(self, model: Model) -> None:

@@ -10,6 +10,7 @@ from nicegui import ui
 
 from glovecal_models.presentation.document import counted
 from glovecal_models.takes.answer import TakeSeries
+from glovecal_service.plain import read
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.rest.take.answer import CheckView, Take
 from glovecal_service.studio.charts.chart import TakeChart
@@ -54,6 +55,9 @@ class TakeView:
         hand = f"/subjects/{quote(own.subject)}/skeleton"
         skeleton = await service.get(hand, hand=own.known_hand)
         raw = await RawHand.of(service, own.layout)
+        note = ui.input("Note", value=own.note).classes("take-note").props("dense maxlength=2000")
+        note.on("blur", partial(self._keep_note, note), args=[])
+        note.on("keydown.enter", partial(self._keep_note, note), args=[])
         self._told = ui.element("div").props('aria-live="polite"')
         with ui.element("div").classes("take-parts"):
             with ui.element("div").classes("take-hand-part"):
@@ -77,6 +81,13 @@ class TakeView:
         self._chart.on_moment(self._replay.seek)
         self._chart.on_stretch(self._drawn)
         await self._look()
+
+    async def _keep_note(self, note: ui.input) -> None:
+        text = str(note.value or "")
+        if text != self._own.note:
+            with refusals():
+                answer = await self._studio.service.put(f"/takes/{self._own.id}/note", {"note": text})
+                self._own = read(Take, answer)
 
     async def show_over(self, over: str) -> None:
         """Another take over it; "" for none."""

@@ -40,6 +40,8 @@ class TakesTable:
                     row.props["data-take"] = take.id
                     with row_head(""):
                         ui.link(take.name, f"/take?id={take.id}").classes("studio-link")
+                        if take.note:
+                            ui.label(take.note).classes("row-note")
                     cell(take.subject)
                     cell(take.wearing or "–")
                     cell(moment(take.created_at))

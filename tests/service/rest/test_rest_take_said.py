@@ -1,4 +1,4 @@
-"""Stretches of takes that people leave out: marked, worked around, undone; the hand of a take in parts."""
+"""What people say of takes: a stretch left out is worked around and undone, a note is found; hands in parts."""
 
 from __future__ import annotations
 
@@ -159,3 +159,15 @@ def test_the_hand_of_a_take_that_was_not_measured(
     assert (posed["source"], posed["model"]) == ("model", model)
     at = 5.0 + np.array(posed["time_s"])
     assert np.array(posed["values"])[:, 0] == pytest.approx(45.0 + 40.0 * np.sin(1.1 * at + 2.0), abs=2.0)
+
+
+def test_a_note_stays_with_its_take_and_is_found(client: RestClient, takes: list[dict[str, Any]]) -> None:
+    path = f"/takes/{takes[1]['id']}"
+    client.post(f"{path}/left-out", {"from_s": 1.0, "to_s": 2.0})
+    kept = client.put(f"{path}/note", {"note": "cold room\r\nthumb slipped"})
+    assert kept["note"].splitlines() == ["cold room", "thumb slipped"]
+    assert kept["left_out"] == [[1.0, 2.0]]
+    assert [take["id"] for take in client.get("/takes", {"text": "COLD"})] == [takes[1]["id"]]
+    with pytest.raises(Refused):
+        client.put(f"{path}/note", {"note": "x" * 2001})
+    assert client.put(f"{path}/note", {"note": ""})["note"] == ""
