@@ -1,4 +1,4 @@
-"""What people say of takes: a stretch left out is worked around and undone, a note is found; hands in parts."""
+"""What people say of takes: a stretch left out is worked around and undone, a note found; hands in parts."""
 
 from __future__ import annotations
 
