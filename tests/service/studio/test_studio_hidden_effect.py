@@ -137,7 +137,7 @@ def test_the_missing_effect_is_seen_named_added_and_live(
 
     person.choose(main.get_by_role("checkbox", name="Live poses come from it"))
     person.choose(add)
-    fall = main.get_by_role("link", name="See the error fall")
+    fall = main.get_by_role("link", name="See the error fall").last
     fall.wait_for()
     expect(main).to_contain_text(f"{CAUSE} was added")
     picture("3-added")
