@@ -1,4 +1,4 @@
-"""What to do next, on a page that has nothing to show: each step as a button, and as the command to copy."""
+"""What to do next: at length on a page that has nothing to show, in a line on every other."""
 
 from __future__ import annotations
 

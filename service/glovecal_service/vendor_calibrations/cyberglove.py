@@ -25,6 +25,7 @@ from collections.abc import Mapping
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
+from glovecal_models.presentation.document import counted
 from glovecal_service.vendor_calibrations.calibration_format import (
     CalibrationFormat,
     Counts,
@@ -144,7 +145,8 @@ def read_asr(text: str, counts: Counts, hand: Handedness) -> FoundLines:
     rows = [line for line in text.splitlines() if line.strip()]
     if len(rows) != len(ORDER):
         raise BadInput(
-            f"{len(rows)} lines; {len(ORDER)} of two points each are expected in an ASR calibration"
+            f"{counted(len(rows), 'line')}; an ASR calibration has {len(ORDER)} of two points each: choose "
+            "another file, or another format"
         )
     lines, left_out = {}, {}
     for number, (sensor, row) in enumerate(zip(ORDER, rows, strict=True), 1):

@@ -31,4 +31,4 @@ def test_the_command_imports_and_exports(run: Run, tmp_path: Path) -> None:
     (tmp_path / "wrong.cal").write_text("no calibration")
     refused = run("model", "import", tmp_path / "wrong.cal", *chosen)
     assert refused.code == 1
-    assert "1 lines; an ASR calibration has 22" in refused.said
+    assert "1 line; an ASR calibration has 22 of two points each" in refused.said

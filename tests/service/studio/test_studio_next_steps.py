@@ -11,6 +11,7 @@ from playwright.sync_api import expect
 from realtime_support import WireGlove, eventually, free_endpoint, part_of_service
 from studio_support import Open, serious
 from test_studio_pages import PAGES
+from unpacked_example import unpacked_example
 
 from glovecal_client.rest import RestClient
 from glovecal_client.session import open_client
@@ -91,18 +92,27 @@ def test_with_a_glove_every_page_says_how_to_calibrate_it(opened: Open, with_a_g
         assert leads == "capture" or name == "capture", name
 
 
-def test_with_a_model_every_page_says_what_it_lacks(opened: Open, address: str) -> None:
-    with RestClient(address) as client:
+@pytest.fixture(scope="module")
+def with_models(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A service whose takes are older than their models."""
+    port = int(free_endpoint().rpartition(":")[2])
+    data = unpacked_example(tmp_path_factory.mktemp("models"))
+    with part_of_service(web, Settings(data=data, zenoh=free_endpoint(), port=port, workers=1)):
+        yield f"http://127.0.0.1:{port}"
+
+
+def test_with_a_model_every_page_says_what_it_lacks(opened: Open, with_models: str) -> None:
+    with RestClient(with_models) as client:
         model = max(client.get("/models"), key=lambda each: len(each["effects"]))["id"]
-    for name, says, leads in steps(opened, address, f"?model={model}"):
+    for name, says, leads in steps(opened, with_models, f"?model={model}"):
         assert f"What model {model[:12]} of " in says, name
         assert leads == f"diagnose?model={model}" or name == "diagnose", name
 
 
 def test_a_model_with_a_better_version_leads_to_the_fall_of_the_error(
-    opened: Open, address: str, trained: str
+    opened: Open, with_models: str, trained: str
 ) -> None:
-    page = opened(f"diagnose?model={trained}", at=address).page
+    page = opened(f"diagnose?model={trained}", at=with_models).page
     line = page.get_by_role("note", name="Next step")
     expect(line).to_contain_text("degrees, its version ")
     line.get_by_role("link", name="See the error fall").click()

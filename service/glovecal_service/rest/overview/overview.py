@@ -1,4 +1,4 @@
-"""``overview``: what there is, and what to do next; for ``glovecal`` alone and pages with nothing to show."""
+"""``overview``: what there is, and what to do next; for ``glovecal`` alone and every page of the studio."""
 
 from __future__ import annotations
 
