@@ -34,7 +34,7 @@ def test_in_and_out_again(client: RestClient) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"text": "no calibration"}, "1 lines; an ASR calibration has 22"),
+        ({"text": "no calibration"}, "1 line; an ASR calibration has 22"),
         ({"format": "excel"}, "format"),
         ({"layout": "nobodys"}, "nobodys"),
         ({"text": "x" * 3_000_000}, "text"),
