@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from foreign_tables import semicolons
 from playwright.sync_api import expect
-from realtime_support import WireGlove, eventually, free_endpoint, part_of_service
-from studio_support import Open, serious
+from realtime_support import eventually, free_endpoint, part_of_service
+from studio_support import Open, moving, serious
 from test_studio_pages import PAGES
 from unpacked_example import unpacked_example
 
@@ -45,22 +45,19 @@ def test_with_nothing_there_are_four_ways_in(opened: Open, empty: str, name: str
 
 @pytest.fixture(scope="module")
 def with_a_glove(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A service that saw a glove, and nothing else."""
+    """A service that a glove streams to, and that knows nothing else."""
     port = int(free_endpoint().rpartition(":")[2])
     settings = Settings(
         data=tmp_path_factory.mktemp("glove") / "data", zenoh=free_endpoint(), port=port, workers=1
     )
     with part_of_service(real_time, settings), part_of_service(web, settings):
         address = f"http://127.0.0.1:{port}"
-        with open_client([settings.zenoh], wait_s=60) as session:
-            glove = WireGlove(session, settings, "g1", subject=None)
-            with RestClient(address) as client:
-
-                def seen() -> bool:
-                    glove.say_meta()
-                    return bool(client.get("/gloves")["seen"])
-
-                eventually(seen, "the glove is seen")
+        with (
+            open_client([settings.zenoh], wait_s=60) as session,
+            moving(session, settings, "g1", None),
+            RestClient(address) as client,
+        ):
+            eventually(lambda: client.get("/gloves")["seen"], "the glove is seen")
             yield address
 
 
