@@ -11,6 +11,8 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.functions import FunctionElement
 
 AT_ITS_BEGINNING = "^"
+FEWEST_OF_AN_ID = 4
+"""Letters: one in sixteen ids begins with any given digit."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,7 @@ class ListPart:
     those in which each of its words is found.
 
     ``searched`` columns, in the methods: ``name``; ``facts.note`` is a key of a JSON document, and what ``^``
-    stands before has to begin with a word.
+    stands before has to begin with a word, of four letters or more.
     """
 
     limit: int | None = None
@@ -45,10 +47,17 @@ class ListPart:
 
     def _holds(self, table: Table, searched: Sequence[str]) -> ColumnElement[bool]:
         words = self.text.split()
-        return and_(True, *(or_(*(_found(table, name, word) for name in searched)) for word in words))
+        return and_(True, *(or_(*_found_in(table, searched, word)) for word in words))
 
 
 WHOLE = ListPart()
+
+
+def _found_in(table: Table, searched: Sequence[str], word: str) -> list[ColumnElement[bool]]:
+    is_short = len(word) < FEWEST_OF_AN_ID
+    return [
+        _found(table, name, word) for name in searched if not (is_short and name.startswith(AT_ITS_BEGINNING))
+    ]
 
 
 def _found(table: Table, name: str, word: str) -> ColumnElement[bool]:

@@ -108,7 +108,7 @@ async def _until_gone(socket: WebSocket) -> None:
 
 
 async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
-    told, shown = None, None
+    told, shown, clock = None, None, asyncio.get_running_loop().time
     while True:
         pose = feed.pose
         if pose is not None and pose is not shown:
@@ -120,7 +120,8 @@ async def _follow(feed: GloveFeed, socket: WebSocket) -> None:
                 told = names if len(given["rotations"]) == len(pose.degrees) else None
             await socket.send_bytes(feed.array(pose))
             shown = pose
-        await asyncio.sleep(FRAME_S)
+        # All feeds look at the same moments: the process is woken once for the gloves of all open pages.
+        await asyncio.sleep(FRAME_S - clock() % FRAME_S)
 
 
 # What a page of the studio may do in the browser: ask its own service only, and stand in nobody's frame.

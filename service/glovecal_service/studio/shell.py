@@ -130,7 +130,7 @@ async def shell(
 # Jobs on every page: what runs and how far it is, cancel, result; what finished meanwhile is announced.
 
 
-EVERY_S = 1.0
+EVERY_S = 2.0
 SHOWN = 12
 WITH_REPORTS = ("improve", "detectability", "calibration-report")
 PAGES = {"diagnose": ("diagnose?model=", "What it found"), "ceiling": ("compare?models=", "Compare")}

@@ -20,7 +20,7 @@ from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
-LOOK_AGAIN_S = 3.0
+LOOK_AGAIN_S = 5.0
 """Models and wearers change elsewhere too."""
 NO_GLOVE = "No glove is connected. Run: glovecal capture --device DEVICE --glove NAME"
 
