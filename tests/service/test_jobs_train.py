@@ -91,7 +91,7 @@ def test_a_job_that_is_finished_twice_has_stored_one_model(trained):
     id = create(trained, method="linear", samples=80, activate=True)
     result, models = result_of(trained, id), len(trained.models.list("anna"))
     plan = TRAIN.plan(trained, trained.jobs.get(id))
-    results = [task.function(task.payload, lambda: False, lambda said, share: None) for task in plan.tasks]
+    results = [task.function(task.payload, lambda: False, lambda *said: None) for task in plan.tasks]
     assert plan.finish(results) == result
     assert len(trained.models.list("anna")) == models
 
