@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import eventually
 
 from glovecal_client.errors import BadOption, DeviceError, DeviceFinished, DeviceLost
 from glovecal_client.pictures.recording import VideoRecording
@@ -47,17 +48,16 @@ def test_a_video_gives_back_every_pixel_and_stamp(tmp_path: Path) -> None:
 def test_a_recording_runs_beside_whatever_else_goes_on(tmp_path: Path) -> None:
     began_ns = time.monotonic_ns()
     with VideoRecording(build_source("rendered"), tmp_path / "fist.mkv") as video:
-        time.sleep(0.7)
-    assert 15 <= video.pictures <= 24
+        eventually(lambda: video.pictures >= 15, "15 pictures are kept")
     about = json.loads(video.describe(take="abc").read_text())
     assert (about["take"], about["simulated"], about["pictures"]) == ("abc", True, video.pictures)
     source = VideoFilePictures(tmp_path / "fist.mkv")
     source.open()
     stamps = [source.read().monotonic_ns for _ in range(video.pictures)]
     source.close()
-    steps = np.diff(stamps) / 1e9
-    assert stamps[0] >= began_ns
-    assert np.median(steps) == pytest.approx(1 / 30, abs=0.01)
+    assert stamps == sorted(stamps)
+    due_ns = began_ns + np.arange(len(stamps)) * 1e9 / 30
+    assert (np.array(stamps) >= due_ns - 1e6).all(), "none comes before it is drawn"
 
 
 def test_a_source_that_ends_keeps_what_there_was_and_says_why(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_a_source_that_ends_keeps_what_there_was_and_says_why(tmp_path: Path) ->
         return np.zeros((16, 16, 3), np.uint8)
 
     with VideoRecording(RenderedPictures(draw), tmp_path / "x.mkv") as video:
-        time.sleep(0.4)
+        eventually(lambda: video.problem, "it is said")
     assert video.problem == "the camera was pulled"
     assert video.pictures == 4
 
