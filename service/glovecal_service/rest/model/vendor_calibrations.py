@@ -24,6 +24,7 @@ from glovecal_service.rest.model.answer import (
     ImportedCalibration,
 )
 from glovecal_service.rest.model.model_import import ModelImport, import_artifact
+from glovecal_service.rest.take.uploaded_files import kept_upload
 from glovecal_service.store.errors import NotFound
 from glovecal_service.vendor_calibrations.calibration_format import FoundLines
 from glovecal_service.vendor_calibrations.formats import (
@@ -121,7 +122,7 @@ class _Reading:
         form = recognised(self._text) if body.format is None else calibration_format(body.format)
         if form is None:
             known = ", ".join(one.title for one in FORMATS.values())
-            raise BadInput(f"this is no calibration that is known; known are {known}")
+            raise BadInput(f"this file is no calibration of these formats: {known}; choose another file")
         self.form = form
         self.hand: Handedness = _hand(parts, body)
 
@@ -157,10 +158,9 @@ class _Reading:
 def _text(parts: Parts, body: Calibration) -> str:
     if body.text is not None:
         return body.text
-    path = None if body.upload is None else parts.uploads.find(body.upload)
-    if path is None:
-        raise NotFound("there is no such upload; send the file to /v1/uploads, or its text")
-    return calibration_text(path)
+    if body.upload is None:
+        raise BadInput("neither upload nor text is given; send the file to uploads and name it, or its text")
+    return calibration_text(kept_upload(parts, body.upload))
 
 
 def _hand(parts: Parts, body: Calibration) -> Handedness:

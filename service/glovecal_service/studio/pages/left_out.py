@@ -1,4 +1,4 @@
-"""What of a dropped file is left out, once for each reason."""
+"""What is left out of a dropped file, once for each reason."""
 
 from __future__ import annotations
 
