@@ -23,10 +23,11 @@ PHALANGES: dict[str, tuple[str, ...]] = {
     for letter, name in FINGERS.items()
 }
 """The bones of each finger that turn, from the palm to the tip."""
-_PARTS = {
-    **{"T_VIR": METACARPAL, "T_MCP": PROXIMAL, "T_IP": DISTAL, "P_CMC": METACARPAL},
-    **{f"{f}_{j}": part for f in "IMRP" for j, part in zip(("MCP", "PIP", "DIP"), PHALANGES["index"], strict=True)},
-}  # fmt: skip
+_PARTS = {"T_VIR": METACARPAL, "T_MCP": PROXIMAL, "T_IP": DISTAL, "P_CMC": METACARPAL} | {
+    f"{finger}_{joint}": part
+    for finger in "IMRP"
+    for joint, part in (("MCP", PROXIMAL), ("PIP", INTERMEDIATE), ("DIP", DISTAL))
+}
 """The bone that a joint is the last to turn."""
 
 
@@ -79,15 +80,15 @@ class HandBones:
 def _joints_in_one_place(skeleton: Skeleton) -> list[tuple[int, int]]:
     """First and last of the joints that turn one bone."""
     here = [not np.any(offset) for offset in skeleton.offsets_mm]
-    found = []
+    groups = []
     for joint, parent in enumerate(skeleton.parents):
         if parent is not None and here[joint]:
             continue
         last = joint
         while last + 1 < len(here) and here[last + 1] and skeleton.parents[last + 1] == last:
             last += 1
-        found.append((joint, last))
-    return found
+        groups.append((joint, last))
+    return groups
 
 
 def _name(joint: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -38,9 +38,15 @@ class HandMotion:
     degrees: np.ndarray
     """(N, R); NaN where a rotation is not known."""
     sd_deg: np.ndarray
-    """(N, R)."""
+    """(N, R); NaN where none is stated."""
     skeleton: Skeleton
     simulated: bool = False
+    flags: np.ndarray | None = None
+    """(N, R) of each rotation, bits as in a live pose; None where there are none."""
+    measured: bool = False
+    """The angles are a reference, not a model's."""
+    notes: Mapping[str, Any] = field(default_factory=dict)
+    """What it was made of and how, for formats that can say it."""
     frame: HandFrame | None = None
     """Where the hand is, if an optical system saw it; else joints are in the forearm's frame."""
     wrist: Wrist = "glove"
@@ -52,14 +58,18 @@ class HandMotion:
         """Some of the frames."""
         return replace(
             self, time_s=self.time_s[which], readings=self.readings[which], degrees=self.degrees[which],
-            sd_deg=self.sd_deg[which], frame=None if self.frame is None else self.frame.frames(which),
+            sd_deg=self.sd_deg[which],
+            flags=None if self.flags is None else self.flags[which],
+            frame=None if self.frame is None else self.frame.frames(which),
             beside={name: places[which] for name, places in self.beside.items()},
         )  # fmt: skip
 
     def require_angles(self, content: Content) -> None:
         """Raises BadInput where nothing is calibrated."""
         if not self.rotations:
-            raise BadInput(f"{content} need a model; without one a take has raw readings only")
+            raise BadInput(
+                f"{content} need a model, or measured angles; without them a take has raw readings only"
+            )
 
 
 def blocks(count: int) -> Iterator[slice]:
@@ -92,6 +102,8 @@ def on_one_time(motions: Sequence[HandMotion], shifts_s: Sequence[float] = ()) -
 def at_times(motion: HandMotion, at: np.ndarray) -> HandMotion:
     """At other times (M,) inside the recording: angles interpolated, NaN in gaps; the nearest readings."""
     time = motion.time_s
+    if np.array_equal(at, time):
+        return motion
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(at), int)
     before = np.maximum(after - 1, 0)
     nearest = np.where(np.abs(at - time[before]) <= np.abs(time[after] - at), before, after)
@@ -107,15 +119,24 @@ def at_times(motion: HandMotion, at: np.ndarray) -> HandMotion:
     return replace(
         motion, time_s=at, readings=np.where(gap[:, None], np.nan, motion.readings[nearest]),
         degrees=between(motion.degrees), sd_deg=between(motion.sd_deg),
+        flags=None if motion.flags is None else motion.flags[nearest],
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """Known by the end of a file's name."""
+    """Known by the end of a file's name. What is said of it is for people: docs/exports.md is made of it."""
 
     suffix: str
     """With its dot, lower case."""
     media_type: str
     write: Callable[[Sequence[HandMotion], Content, Path], None]
     """Writes hands on one time to a file. Raises BadInput."""
+    contents: tuple[Content, ...]
+    name: str
+    unit: str
+    axes: str
+    times: str
+    accuracy: str
+    """What it holds of the angles' standard deviations and flags."""
+    read_by: str

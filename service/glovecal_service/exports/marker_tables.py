@@ -20,8 +20,9 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, WRIST, completed
 from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_columns
-from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion, blocks
+from glovecal_service.exports.hand_motion import CONTENTS, Content, ExportFormat, HandMotion, blocks
 
+HAND_AXES = "of the forearm: x to the fingers, y to the right hand's thumb, z out of the back of the hand"
 TRIPLES: dict[str, tuple[str, ...]] = {
     "thumb": ("TI_ABD", "T_MCP", "T_IP"),
     "thumb_roll": ("T_TMC",),
@@ -147,11 +148,15 @@ def _rows(time_s: np.ndarray, found: Mapping[str, np.ndarray], first: int) -> It
         yield f"{number}\t{time:.9f}\t{cells}\n"
 
 
-TRC = ExportFormat(".trc", "text/tab-separated-values", write_trc)
+TRC = ExportFormat(
+    ".trc", "text/tab-separated-values", write_trc, CONTENTS, "TRC",
+    unit="mm", axes=HAND_AXES, times="the frames' own", accuracy="nothing", read_by="OpenSim, MotionBuilder",
+)  # fmt: skip
 
 
 def write_table(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
-    """``p.`` and ``sd.`` in degrees, ``j.JOINT.x`` in mm, or raw ``s.``; of two hands each with its label."""
+    """``p.`` (predicted) or ``r.`` (measured), ``sd.`` in degrees and ``flags.``; ``j.JOINT.x`` in mm; or raw
+    ``s.``; of two hands each with its label."""
     write_columns(_blocks(motions, content), path)
 
 
@@ -178,11 +183,23 @@ def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
             for name, place in markers(motion, content).items()
             for number, axis in enumerate("xyz")
         }
-    angles = zip(motion.rotations, motion.degrees.T, motion.sd_deg.T, strict=True)
-    return {
-        key: values for name, mean, sd in angles for key, values in ((f"p.{name}", mean), (f"sd.{name}", sd))
-    }
+    prefix = "r" if motion.measured else "p"
+    columns: dict[str, np.ndarray] = {}
+    for number, name in enumerate(motion.rotations):
+        columns |= {f"{prefix}.{name}": motion.degrees[:, number], f"sd.{name}": motion.sd_deg[:, number]}
+        if motion.flags is not None:
+            columns[f"flags.{name}"] = motion.flags[:, number]
+    return columns
 
 
-CSV = ExportFormat(".csv", "text/csv", write_table)
-PARQUET = ExportFormat(".parquet", "application/vnd.apache.parquet", write_table)
+CSV, PARQUET = (
+    ExportFormat(
+        suffix, media_type, write_table, CONTENTS, name,
+        unit="mm, degrees", axes=HAND_AXES, times="the frames' own",
+        accuracy="standard deviations and flags", read_by=read_by,
+    )
+    for suffix, media_type, name, read_by in (
+        (".csv", "text/csv", "CSV", "spreadsheets, pandas, R, MATLAB"),
+        (".parquet", "application/vnd.apache.parquet", "Parquet", "pandas, Polars, DuckDB, Spark"),
+    )
+)  # fmt: skip

@@ -22,8 +22,9 @@ from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
-from glovecal_service.exports.formats import format_of
+from glovecal_service.exports.formats import format_of, require_held
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
+from glovecal_service.exports.resampling import Resampling
 from glovecal_service.store.records import SubjectRecord
 
 
@@ -36,6 +37,7 @@ def motion_of(take: Take, model: CalibrationModel | None, skeleton: Skeleton, la
     count = int(asked.sum())
     rotations: tuple[str, ...] = ()
     degrees = sd_deg = np.empty((count, 0))
+    flags = np.empty((count, 0), np.uint8)
     if model is not None:
         require_layout(take, model.layout)
         predictor = GlovePredictor(model)
@@ -45,9 +47,27 @@ def motion_of(take: Take, model: CalibrationModel | None, skeleton: Skeleton, la
         rotations = predictor.rotations
         degrees = np.where(unusable, np.nan, found.mean)[asked]
         sd_deg = np.where(unusable, np.nan, found.sd)[asked]
+        flags = found.flags[asked]
     return HandMotion(
         label, take.time_s[asked], take.sensors, take.readings[asked], rotations, degrees, sd_deg, skeleton,
-        take.simulated,
+        take.simulated, flags,
+    )  # fmt: skip
+
+
+def measured_motion(take: Take, skeleton: Skeleton, label: str) -> HandMotion:
+    """The angles that were measured, at their own times; readings are those of the nearest frame. Raises
+    BadInput where none were."""
+    rows = np.isfinite(take.reference).any(axis=1) & (take.reference_time_s >= take.start_s)
+    if not rows.any():
+        raise BadInput(f"take {take.name} has no measured angles to export; name a model")
+    time_s = take.reference_time_s[rows]
+    after = np.clip(np.searchsorted(take.time_s, time_s), 1, max(len(take.time_s) - 1, 1))
+    nearest = np.where(time_s - take.time_s[after - 1] < take.time_s[after] - time_s, after - 1, after)
+    degrees = take.reference[rows]
+    sd_deg = np.full_like(degrees, np.nan) if take.reference_sd is None else take.reference_sd[rows]
+    return HandMotion(
+        label, time_s, take.sensors, take.readings[nearest], take.rotations, degrees, sd_deg, skeleton,
+        take.simulated, measured=True,
     )  # fmt: skip
 
 
@@ -66,7 +86,11 @@ class HandTake:
     subject: SubjectRecord
     hand: Handedness
     artifact: bytes | None
-    """The model's; None for raw readings."""
+    """The model's; None for raw readings, and for measured angles."""
+    model: str | None
+    """Its id."""
+    measured: bool
+    """The take's own reference angles are wanted."""
     accounting: Mapping[str, Any] | None
 
     @property
@@ -76,8 +100,13 @@ class HandTake:
     def motion(self) -> HandMotion:
         model = None if self.artifact is None else load(self.artifact)
         arches = model is not None and model.method == "template" and PALM in model.rotation_names
+        notes = {"take": self.take.name, "hand": self.hand, "model": self.model, "measured": self.measured}
+        if self.measured:
+            palm = "arching" if PALM in self.take.rotations else "rigid"
+            skeleton = self.subject.skeleton(self.hand, palm)
+            return replace(measured_motion(self.take, skeleton, self.label), notes=notes)
         skeleton = self.subject.skeleton(self.hand, "arching" if arches else "rigid")
-        return motion_of(self.take, model, skeleton, self.label)
+        return replace(motion_of(self.take, model, skeleton, self.label), notes=notes)
 
 
 @dataclass(frozen=True)
@@ -100,6 +129,7 @@ class MotionFile:
     claps: bool
     wrist: Wrist
     body: Body | None
+    resampling: Resampling
 
     def __post_init__(self) -> None:
         labels = [hand.label for hand in self.hands]
@@ -108,6 +138,7 @@ class MotionFile:
                 "both takes are of the same hand; if one is not, say so, in the order of the takes: "
                 "--hand right --hand left"
             )
+        require_held(format_of(self.path.name), self.content)
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
         if self.frames > MOST_FRAMES:
@@ -135,7 +166,7 @@ def write_motion(asked: MotionFile) -> None:
         hands = [replace(one, wrist="optical") for one in hands]
     if asked.body is not None:
         hands = _with_body(asked, asked.body, hands)
-    format_of(asked.path.name).write(hands, asked.content, asked.path)
+    format_of(asked.path.name).write(asked.resampling.of(hands), asked.content, asked.path)
 
 
 def _with_body(asked: MotionFile, body: Body, hands: Sequence[HandMotion]) -> list[HandMotion]:

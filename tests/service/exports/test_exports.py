@@ -17,7 +17,7 @@ from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.layout import Layout
-from glovecal_service.exports.formats import FORMATS, format_of
+from glovecal_service.exports.formats import FORMATS, format_of, require_held
 from glovecal_service.exports.hand_motion import CONTENTS, HandMotion, on_one_time
 from glovecal_service.exports.marker_tables import markers, trc_text
 
@@ -142,14 +142,17 @@ def test_nothing_is_invented_in_a_gap(count: int, gap_at: int, seed: int) -> Non
 
 def test_a_take_without_a_model_has_raw_readings_only(tmp_path: Path) -> None:
     bare = replace(motion(), rotations=(), degrees=np.empty((40, 0)), sd_deg=np.empty((40, 0)))
-    for suffix in FORMATS:
-        if suffix != ".bvh":  # holds rotations only
-            FORMATS[suffix].write([bare], "raw", tmp_path / f"raw{suffix}")
+    for suffix, chosen in FORMATS.items():
+        if "raw" in chosen.contents:
+            chosen.write([bare], "raw", tmp_path / f"raw{suffix}")
+        else:
+            with pytest.raises(BadInput, match=rf"\{suffix} cannot hold raw; \.trc, \.csv, \.parquet can"):
+                require_held(chosen, "raw")
         for content in ("angles", "joints"):
             with pytest.raises(BadInput, match="need a model"):
-                FORMATS[suffix].write([bare], content, tmp_path / f"x{suffix}")
-    with pytest.raises(BadInput, match=r"must end in \.trc, \.bvh, \.csv, \.parquet"):
-        format_of("hand.fbx")
+                chosen.write([bare], content, tmp_path / f"x{suffix}")
+    with pytest.raises(BadInput, match=r"must end in \.trc, \.bvh, .*\.parquet"):
+        format_of("hand.stl")
 
 
 def test_a_hand_whose_palm_arches_has_the_place_of_its_joint_too() -> None:

@@ -73,7 +73,8 @@ def test_angles_are_those_of_the_active_model(client: RestClient, tmp_path: Path
         ({"takes": []}, 422, "takes"),
         ({"models": ["0123456789"]}, 422, "1 models for 2 takes"),
         ({"shifts_s": [0.0, 1e6]}, 422, "no moment in common"),
-        ({"format": "fbx"}, 422, "format"),
+        ({"format": "stl"}, 422, "format"),
+        ({"format": "glb"}, 422, r"\.glb cannot hold raw"),
         ({"content": "wrist"}, 422, "content"),
     ],
 )

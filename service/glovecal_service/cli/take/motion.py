@@ -34,12 +34,22 @@ def _names(given: str | None) -> list[str]:
 
 
 def motion(
-    file: Annotated[Path, typer.Argument(help="Where to write; .bvh, .trc, .csv or .parquet.")],
+    file: Annotated[Path, typer.Argument(help="Where to write; its ending is the format, such as .bvh.")],
     take: Annotated[list[str], typer.Argument(help="One take, or a take of each hand: names or ids.")],
     content: Annotated[
         Literal["joints", "angles", "raw"],
         typer.Option(help="Places of joints in mm, calibrated degrees, or readings as they came."),
     ] = "joints",
+    measured: Annotated[
+        bool, typer.Option("--measured", help="The angles that were measured, not those of a model.")
+    ] = False,
+    rate: Annotated[
+        float | None, typer.Option(help="Frames a second on even steps; default: the frames' own times.")
+    ] = None,
+    low_pass: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Leave out what is faster, without delay (Butterworth, both ways)."),
+    ] = None,
     model: Annotated[
         list[str] | None,
         typer.Option("--model", "-m", help="One a take; default: the active ones.", callback=_models),
@@ -91,6 +101,9 @@ def motion(
             "models": model or [],
             "hands": hand or [],
             "content": content,
+            "measured": measured,
+            "rate_hz": rate,
+            "low_pass_hz": low_pass,
             "format": chosen.suffix.removeprefix("."),
             "file_name": file.name,
             "shifts_s": shift or [],

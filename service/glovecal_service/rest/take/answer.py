@@ -13,6 +13,7 @@ from glovecal_models.takes.camera_estimates import CoveredRange
 from glovecal_models.takes.hand_clocks import How
 from glovecal_models.takes.take import ReferenceJump, Stretch
 from glovecal_models.takes.take_check import RotationRange, SensorRange
+from glovecal_service.exports.hand_motion import Content
 from glovecal_service.file_kinds import FileKind
 from glovecal_service.plain import Row
 
@@ -234,3 +235,14 @@ class HandBeside(Row):
     degrees: list[list[float] | None] = Field(
         description="Of the whole hand at each picture; null where the take has no frame within 0.1 s."
     )
+
+
+class MotionFormat(Row):
+    format: str = Field(description="The end of a file's name, without its dot.")
+    name: str
+    contents: list[Content] = Field(description="What it can hold.")
+    unit: str
+    axes: str
+    times: str
+    accuracy: str = Field(description="What it holds of the angles' standard deviations and flags.")
+    read_by: str

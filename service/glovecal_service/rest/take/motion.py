@@ -20,16 +20,19 @@ from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.exports.motion_file import Body as BodyFile
 from glovecal_service.exports.motion_file import HandTake, MotionFile, write_motion
+from glovecal_service.exports.resampling import Resampling
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.take.answer import MotionFormat
 from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])
 
 MOST_HANDS = 2
 LARGEST_SHIFT_S = 1e9
+FASTEST_HZ = 1000.0
 LIMIT_S = 1800.0
 """An hour of one hand took 4 minutes on two loaded cores."""
 LONGEST_NAME = 50
@@ -68,6 +71,17 @@ class Motion(StrictBody):
     content: Content = Field(
         "joints", description="joints: places in mm; angles: calibrated degrees; raw: readings."
     )
+    measured: bool = Field(
+        False, description="The angles that were measured (the takes' reference), not those of a model."
+    )
+    rate_hz: Annotated[FiniteFloat, Field(gt=0, le=FASTEST_HZ)] | None = Field(
+        None, description="Frames on even steps of this rate; null: at the frames' own times."
+    )
+    low_pass_hz: Annotated[FiniteFloat, Field(gt=0, le=FASTEST_HZ)] | None = Field(
+        None,
+        description="Angles without what is faster: a Butterworth filter forward and backward, which delays "
+        "nothing; frames then stand on even steps.",
+    )
     format: Annotated[str, Field(pattern=r"^[a-z0-9]{1,16}$")] = Field(
         "trc", description=f"One of {', '.join(suffix[1:] for suffix in FORMATS)}."
     )
@@ -83,6 +97,24 @@ class Motion(StrictBody):
     body: Body | None = Field(
         None, description="Markers of an optical system, joined to the joints in a TRC."
     )
+
+
+@router.get("", summary="Formats of motion files")
+def list_formats() -> list[MotionFormat]:
+    """What each holds, and how: units, axes, times, standard deviations."""
+    return [
+        MotionFormat(
+            format=one.suffix.removeprefix("."),
+            name=one.name,
+            contents=list(one.contents),
+            unit=one.unit,
+            axes=one.axes,
+            times=one.times,
+            accuracy=one.accuracy,
+            read_by=one.read_by,
+        )
+        for one in FORMATS.values()
+    ]
 
 
 @router.post(
@@ -132,23 +164,26 @@ def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
     models = body.models or [None] * len(body.takes)
     sides = body.hands or [None] * len(body.takes)
     asked = zip(body.takes, models, sides, strict=True)
-    hands = [_hand(parts, take, model, body.content, side) for take, model, side in asked]
+    hands = [_hand(parts, body, take, model, side) for take, model, side in asked]
     markers = None
     if body.body is not None:
         file = parts.uploads.find(body.body.upload)
         if file is None:
             raise NotFound(f"no upload {body.body.upload[:12]}; send the TRC file to /v1/uploads first")
         markers = BodyFile(file, body.body.shift_s, tuple(body.body.right), tuple(body.body.left))
-    return MotionFile(tuple(hands), body.content, path, tuple(body.shifts_s), body.claps, body.wrist, markers)
+    resampling = Resampling(body.rate_hz, body.low_pass_hz)
+    return MotionFile(
+        tuple(hands), body.content, path, tuple(body.shifts_s), body.claps, body.wrist, markers, resampling
+    )
 
 
-def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Handedness | None) -> HandTake:
+def _hand(parts: Parts, body: Motion, take: str, model: str | None, hand: Handedness | None) -> HandTake:
     """``hand`` counts where it is given, then what capture said of the glove, then the subject's."""
     record = parts.store.takes.get(take)
     subject = parts.store.subjects.get(record.subject)
     side = hand or record.known_hand or subject.known_hand
-    artifact = None
-    if content != "raw":
+    artifact = chosen = None
+    if body.content != "raw" and not body.measured:
         chosen = (
             parts.store.models.active(record.subject, record.layout, hand or record.known_hand)
             if model is None
@@ -157,7 +192,7 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
         if chosen is None:
             raise Conflict(
                 f"no model of {record.subject} with layout {record.layout} is active: name a model, or ask "
-                "for raw readings"
+                "for measured angles or raw readings"
             )
         artifact = parts.store.models.load_bytes(chosen.id)
     if side is None:
@@ -165,4 +200,7 @@ def _hand(parts: Parts, take: str, model: str | None, content: Content, hand: Ha
             f"nobody said which hand take {record.name} is of: name it with --hand left or --hand right, or "
             f"say it of the subject: glovecal subject measure {record.subject} --hand left"
         )
-    return HandTake(parts.store.takes.load_recorded(record.id), subject, side, artifact, record.accounting)
+    recorded, measured = parts.store.takes.load_recorded(record.id), body.measured and body.content != "raw"
+    return HandTake(
+        recorded, subject, side, artifact, chosen.id if chosen else None, measured, record.accounting
+    )

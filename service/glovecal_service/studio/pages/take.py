@@ -11,6 +11,7 @@ from nicegui import ui
 
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.heading import heading
+from glovecal_service.studio.pages.take_export import TakeExport
 from glovecal_service.studio.pages.take_view import TakeView, add_take_styles
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import Around, page, shell
@@ -48,8 +49,11 @@ async def _build(studio: Studio, around: Around, takes: Sequence[Take], id: str,
             others, value=over, label="Over it", on_change=lambda event: view.show_over(event.value)
         ).classes("choice")
     await view.build(over)
+    await TakeExport(studio, own, takes, view.posed_by).build()
     with ui.element("div").classes("page-acts"):
-        ui.link("Export as a table", f"../v1/takes/{own.id}/export").classes("studio-link").props("download")
+        ui.link("Download the recording as a table", f"../v1/takes/{own.id}/export").classes(
+            "studio-link"
+        ).props("download")
         ui.link("Train on takes", "/takes").classes("studio-link")
 
 

@@ -47,11 +47,14 @@ class TakeView:
         self._own = own
         self._model = model
         self._over = ""
+        self.posed_by: str | None = None
+        """The id of the model that gives the hand its poses, known once it is built."""
 
     async def build(self, over: str = "") -> None:
         """``over``: the id of another take that is drawn over it."""
         own, self._over = self._own, over
         model, service = await self._posing(), self._studio.service
+        self.posed_by = model
         hand = f"/subjects/{quote(own.subject)}/skeleton"
         skeleton = await service.get(hand, hand=own.known_hand)
         raw = await RawHand.of(service, own.layout)
