@@ -71,6 +71,14 @@ class HandBones:
         order of the skeleton's rotations. Raises BadInput as ``forward_kinematics``."""
         return forward_kinematics(self.skeleton, angles_deg).orientations[:, list(self.joints)]
 
+    def posed(self, angles_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``orientations``, and (N, B, 2, 3) mm in the forearm's frame where each bone begins and ends."""
+        frames = forward_kinematics(self.skeleton, angles_deg)
+        joints = list(self.joints)
+        heads, turned = frames.joints_mm[:, joints], frames.orientations[:, joints]
+        tails = heads + (turned @ self.tails_mm[:, :, None])[..., 0]
+        return turned, np.stack([heads, tails], axis=2)
+
     @cached_property
     def straight(self) -> np.ndarray:
         """(B, 3, 3) orientations with every rotation at zero: flat hand, fingers straight, thumb closed."""
