@@ -213,7 +213,10 @@ class _GloveFeed:
     def _run(self) -> None:
         while not self._is_over.is_set():
             arrival = self._poses.wait_arrival(STALE_AFTER_S)
-            hand, is_new = self._silent() if arrival is None else self._understood(*arrival), arrival is not None
+            hand, is_new = (
+                self._silent() if arrival is None else self._understood(*arrival),
+                arrival is not None,
+            )
             if hand is None or self._is_over.is_set():
                 continue
             self._traffic.note_taken(hand, is_new=is_new)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 from glovecal_service.bridges.bridge import Bridge
+from glovecal_service.bridges.lsl import LslBridge
 from glovecal_service.bridges.websocket import WebSocketBridge
 
 BRIDGES: dict[str, type[Bridge]] = {
     "websocket": WebSocketBridge,
+    "lsl": LslBridge,
 }
 
 

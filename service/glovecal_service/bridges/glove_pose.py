@@ -1,4 +1,4 @@
-"""A pose on its way through a bridge: with the names of its rotations, the hand it is of, and what it is worth."""
+"""A pose on its way through a bridge: with names of its rotations, whose hand it is, and what it is worth."""
 
 from __future__ import annotations
 
@@ -60,7 +60,9 @@ class GlovePose:
         angles = np.radians(self.pose.degrees.astype(float)).tolist()
         return {
             name: angle
-            for name, angle, is_usable in zip(self.meaning.rotations, angles, self.usable.tolist(), strict=True)
+            for name, angle, is_usable in zip(
+                self.meaning.rotations, angles, self.usable.tolist(), strict=True
+            )
             if is_usable
         }
 

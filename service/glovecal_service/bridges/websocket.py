@@ -1,11 +1,11 @@
 """Poses for browsers: a WebSocket server that gives each receiver the newest pose it has not had yet.
 
-    ws://127.0.0.1:8765/            JSON, every glove; /right only glove right
-    ws://127.0.0.1:8765/binary/right  the wire's own pose messages of one glove, what they mean as JSON
+    ws://127.0.0.1:8765/              JSON, every glove; /right only glove right
+    ws://127.0.0.1:8765/binary/right  the wire's own poses of one glove, what they mean as JSON
 
-A text message is a JSON object: ``type`` ``meta`` with a glove's ``pose/meta`` (names, hand, skeleton), before the
-first pose and when it changes, or ``type`` ``pose``. Stale poses come on, their ``state`` says so (in a binary
-message, the flag). Web pages of other computers are refused by their ``Origin``.
+A text message is a JSON object: ``type`` ``meta`` with a glove's ``pose/meta`` (names, hand, skeleton) before
+the first pose and when it changes, or ``type`` ``pose``. Stale poses come on, their ``state`` says so (in a
+binary message, the flag). Web pages of other computers are refused by their ``Origin``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import threading
 from concurrent.futures import Future
 from functools import cached_property
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from glovecal_client.keys import IDENTIFIER
 from glovecal_client.wire.pose import encode_pose
@@ -36,7 +36,7 @@ DEFAULT_PORT = 8765
 _OF_THIS_COMPUTER = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 _PATH = re.compile(r"/(?:(?P<binary>binary)/(?P<only>[^/?]+)|(?P<glove>(?!binary/?$)[^/?]*))/?(?:\?.*)?")
 _MOST_WAITING_BYTES = 16_384
-"""Of a receiver that does not read: some dozen poses in the system, then newer ones take the place of older."""
+"""Of a receiver that does not read: some dozen poses in the system, then newer ones replace older ones."""
 _LARGEST_INPUT_BYTES = 1024
 
 
@@ -45,7 +45,7 @@ class WebSocketBridge(Bridge):
 
     about = "web pages and scripts: JSON, or the wire's own binary poses"
     when_stale = "the last pose, with state stale"
-    options = {
+    options: ClassVar[dict[str, str]] = {
         "port": f"to listen on; default {DEFAULT_PORT}",
         "host": f"address to listen on; default {LOOPBACK}, this computer only",
         "origin": "an origin whose pages may connect besides this computer's, such as https://stage.example; "

@@ -64,7 +64,7 @@ class WornHand:
         return {"glove": self.glove, "computer": computer_id(), "hand": self.hand}
 
     def put(
-        self, angles: Mapping[str, float] | None = None, *, flags: PoseFlag = PoseFlag(0),
+        self, angles: Mapping[str, float] | None = None, *, flags: int = 0,
         rotation_flags: Mapping[str, int] | None = None, time_ns: int | None = None,
     ) -> Pose:  # fmt: skip
         """The next pose: ``angles`` in degrees over a flat hand. Uncalibrated while there is no model."""
@@ -75,7 +75,7 @@ class WornHand:
             monotonic_ns = clock_ns() if time_ns is None else time_ns
             pose = Pose(
                 self.sequence, self.run_id, monotonic_ns, wall_ns(), degrees, np.ones_like(degrees), marks,
-                self.model, int(flags if self.model else flags | PoseFlag.UNCALIBRATED), age_us=800,
+                self.model, flags if self.model else flags | PoseFlag.UNCALIBRATED, age_us=800,
             )  # fmt: skip
             self._session.put(self.keys.pose, encode_pose(pose), express=True)
             self.sequence += 1
@@ -97,7 +97,7 @@ class _Stream(threading.Thread):
     def run(self) -> None:
         while not self._is_over.wait(self._period_s):
             for hand in self._hands:
-                posture = self.postures.get(hand.glove)
+                posture = self.postures.get(hand.hand)
                 if posture is not None:
                     hand.put(**posture)
 
@@ -112,7 +112,7 @@ class Stage:
     right: WornHand
     left: WornHand
     postures: dict[str, Any] = field(default_factory=dict)
-    """By glove: arguments of ``WornHand.put``; a glove without one is silent."""
+    """By hand: arguments of ``WornHand.put``; a glove without one is silent."""
 
     def show(self, **postures: Mapping[str, Any] | None) -> None:
         """From now on both are put with these arguments; None: silent."""
@@ -124,12 +124,14 @@ class Stage:
 
 
 @contextmanager
-def open_stage(rate_hz: float = 60.0) -> Iterator[Stage]:
+def open_stage(rate_hz: float = 60.0, suffix: str = "") -> Iterator[Stage]:
+    """Gloves ``right`` and ``left``, with ``suffix`` where whole computers share their names."""
     endpoint = free_endpoint()
     with ExitStack() as opened:
         opened.enter_context(open_router([endpoint]))
         session = opened.enter_context(open_client([endpoint]))
-        stage = Stage(endpoint, WornHand(session, "right", "right"), WornHand(session, "left", "left"))
+        right, left = WornHand(session, f"right{suffix}", "right"), WornHand(session, f"left{suffix}", "left")
+        stage = Stage(endpoint, right, left)
         stream = _Stream(stage.hands, rate_hz, stage.postures)
         stream.start()
         opened.callback(stream.stop)

@@ -55,7 +55,7 @@ def bridge(
 ) -> None:
     """Send gloves' live poses on to another tool. Ctrl-C stops it.
 
-    Once a second it prints rate, poses left out, reconnects and added delay; with --json one line of JSON each.
+    Once a second it prints rate, poses left out, reconnects and added delay; with --json as a line of JSON.
     """
     from glovecal_client.capture.command import parse_options
     from glovecal_client.errors import NoAnswer
@@ -100,7 +100,9 @@ def _list_bridges(as_json: bool) -> None:
     if as_json:
         _print_line(rows)
         return
-    print_table(rows, {"name": "bridge", "about": "for", "when_stale": "when stale or uncalibrated"}, empty="")
+    print_table(
+        rows, {"name": "bridge", "about": "for", "when_stale": "when stale or uncalibrated"}, empty=""
+    )
     out.print("\nglovecal bridge NAME --glove right --glove left; glovecal bridge --help tells the options.")
 
 
