@@ -6,11 +6,13 @@ from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 from glovecal_service.bridges.bridge import Bridge
 from glovecal_service.bridges.lsl import LslBridge
+from glovecal_service.bridges.ros2 import Ros2Bridge
 from glovecal_service.bridges.websocket import WebSocketBridge
 
 BRIDGES: dict[str, type[Bridge]] = {
     "websocket": WebSocketBridge,
     "lsl": LslBridge,
+    "ros2": Ros2Bridge,
 }
 
 

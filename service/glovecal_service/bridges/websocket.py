@@ -1,7 +1,7 @@
 """Poses for browsers: a WebSocket server that gives each receiver the newest pose it has not had yet.
 
-    ws://127.0.0.1:8765/              JSON, every glove; /right only glove right
-    ws://127.0.0.1:8765/binary/right  the wire's own poses of one glove, what they mean as JSON
+    ws://127.0.0.1:8766/              JSON, every glove; /right only glove right
+    ws://127.0.0.1:8766/binary/right  the wire's own poses of one glove, what they mean as JSON
 
 A text message is a JSON object: ``type`` ``meta`` with a glove's ``pose/meta`` (names, hand, skeleton) before
 the first pose and when it changes, or ``type`` ``pose``. Stale poses come on, their ``state`` says so (in a
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
     from websockets.typing import Origin
 
-DEFAULT_PORT = 8765
+DEFAULT_PORT = 8766
 _OF_THIS_COMPUTER = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 _PATH = re.compile(r"/(?:(?P<binary>binary)/(?P<only>[^/?]+)|(?P<glove>(?!binary/?$)[^/?]*))/?(?:\?.*)?")
 _MOST_WAITING_BYTES = 16_384
