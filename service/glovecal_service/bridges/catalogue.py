@@ -5,6 +5,7 @@ from __future__ import annotations
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
 from glovecal_service.bridges.bridge import Bridge
+from glovecal_service.bridges.foxglove import FoxgloveBridge
 from glovecal_service.bridges.lsl import LslBridge
 from glovecal_service.bridges.ros2 import Ros2Bridge
 from glovecal_service.bridges.websocket import WebSocketBridge
@@ -13,6 +14,7 @@ BRIDGES: dict[str, type[Bridge]] = {
     "websocket": WebSocketBridge,
     "lsl": LslBridge,
     "ros2": Ros2Bridge,
+    "foxglove": FoxgloveBridge,
 }
 
 

@@ -11,10 +11,15 @@ import numpy as np
 
 from glovecal_client.wire.pose import Pose, RotationFlag
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.bones import HandBones
 from glovecal_models.hand.rotations import Handedness, completed, known_hand
 from glovecal_models.hand.skeleton import Skeleton, skeleton_from_document
 
 PoseState = Literal["live", "stale", "uncalibrated"]
+NO_HAND = (
+    "nobody said which hand it is on, so its bones are not known; say so: "
+    "glovecal subject measure {subject} --hand right"
+)
 UNUSABLE = RotationFlag.TOO_UNCERTAIN | RotationFlag.FAULTY_SENSOR
 
 
@@ -28,7 +33,11 @@ class PoseMeaning:
         self.skeleton: Skeleton | None = None
         """None where nobody said which hand it is, or what was said is no skeleton."""
         self.problem = ""
-        if document.get("skeleton") is not None:
+        """Why the bones are not known, a sentence."""
+        if document.get("skeleton") is None:
+            if self.rotations:
+                self.problem = NO_HAND.format(subject=document.get("subject") or "SUBJECT")
+        else:
             try:
                 self.skeleton = skeleton_from_document(document["skeleton"])
             except BadInput as error:
@@ -67,18 +76,28 @@ class GlovePose:
         }
 
 
-class WholeHand:
-    """Every angle of a glove's hand, for formats that show bones: what is not usable keeps its last usable
-    angle, and what was never usable follows the hand's rules."""
+class BonesInMotion:
+    """The bones of one glove's hand as its poses come.
+
+    An angle that is not usable keeps its last usable value; what was never usable follows a rule, or rests.
+    """
 
     def __init__(self) -> None:
         self._last: dict[str, float] = {}
         self._model: str | None = None
+        self._bones: HandBones | None = None
 
-    def angles_deg(self, hand: GlovePose, skeleton: Skeleton) -> np.ndarray:
-        """(R,), in the order of ``skeleton.rotations``."""
+    def orientations(self, hand: GlovePose) -> tuple[HandBones, np.ndarray] | None:
+        """The bones and their orientations (B, 3, 3) in the forearm's frame; None where it is not known which
+        hand the glove is on."""
+        skeleton = hand.meaning.skeleton
+        if skeleton is None:
+            return None
+        if self._bones is None or self._bones.skeleton is not skeleton:
+            self._bones = HandBones.of(skeleton)
         if hand.pose.model_sha256 != self._model:
             self._last, self._model = {}, hand.pose.model_sha256
         usable = zip(hand.meaning.rotations, hand.pose.degrees.tolist(), hand.usable.tolist(), strict=True)
         self._last |= {name: degrees for name, degrees, is_usable in usable if is_usable}
-        return completed(list(self._last), np.array([list(self._last.values())]), skeleton.rotations)[0]
+        angles_deg = completed(list(self._last), np.array([list(self._last.values())]), skeleton.rotations)
+        return self._bones, self._bones.orientations(angles_deg)[0]

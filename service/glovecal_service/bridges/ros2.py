@@ -88,8 +88,8 @@ class Ros2Bridge(Bridge):
             self._session = self._opened.enter_context(open_client([endpoint], wait_s=_WAIT_S))
         except NoAnswer as error:
             raise BadInput(
-                f"no ROS 2 router at {self._host}:{self._port}; start it (ros2 run rmw_zenoh_cpp rmw_zenohd), "
-                "or say where it is: --to HOST:PORT"
+                f"no ROS 2 router at {self._host}:{self._port}; start it (ros2 run rmw_zenoh_cpp "
+                "rmw_zenohd), or say where it is: --to HOST:PORT"
             ) from error
         zid = str(self._session.info.zid())
         node = f"@ros2_lv/{self._domain}/{zid}/0/0/NN/{_NOTHING}/{_NOTHING}/{NODE}"
