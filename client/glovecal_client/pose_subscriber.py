@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 
 import zenoh
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys
 from glovecal_client.plausible_loss import PlausibleLoss
@@ -129,7 +129,7 @@ class PoseSubscriber:
         self._changed = threading.Condition()
         self._order = PoseOrder()
         self._latest: Pose | None = None
-        self._latest_at = 0.0
+        self._latest_at = 0
         self._fresh = False
         self._meta: dict[str, Any] | None = None
         self._closed = False
@@ -155,7 +155,7 @@ class PoseSubscriber:
         """Nothing came for half a second (or ever), or the service says that the glove is silent."""
         with self._changed:
             pose = self._latest
-            return pose is None or pose.stale or time.monotonic() - self._latest_at > self._stale_after_s
+            return pose is None or pose.stale or clock_ns() - self._latest_at > 1e9 * self._stale_after_s
 
     @property
     def counts(self) -> PoseCounts:
@@ -165,12 +165,17 @@ class PoseSubscriber:
 
     def wait(self, timeout_s: float) -> Pose | None:
         """The newest pose not yet given by ``wait`` or iteration, None if there was none in time."""
+        arrived = self.wait_arrival(timeout_s)
+        return None if arrived is None else arrived[0]
+
+    def wait_arrival(self, timeout_s: float) -> tuple[Pose, int] | None:
+        """As ``wait``, with the moment at which the pose arrived here, ``clock_ns``."""
         with self._changed:
             self._changed.wait_for(lambda: self._fresh or self._closed, timeout_s)
-            if not self._fresh:
+            if not self._fresh or self._latest is None:
                 return None
             self._fresh = False
-            return self._latest
+            return self._latest, self._latest_at
 
     def __iter__(self) -> Iterator[Pose]:
         """Newest poses as they come, until the subscriber is closed."""
@@ -179,21 +184,25 @@ class PoseSubscriber:
             if pose is not None:
                 yield pose
 
-    def rotations(self, pose: Pose, *, timeout_s: float = 2.0) -> tuple[str, ...]:
-        """Names of the pose's rotations, in order. Asks the service if the names known are of another model.
+    def meta(self, pose: Pose, *, timeout_s: float = 2.0) -> dict[str, Any]:
+        """``pose/meta`` as it was said of this pose's model: names of its rotations, hand, skeleton.
 
-        Raises NoAnswer while nobody says what the rotations of this pose's model are.
+        The same object until another is said. Asks the service if what is known is of another model; raises
+        NoAnswer while nobody says what this pose's numbers are.
         """
-        names = _names(self._meta, pose)
-        if names is None:
+        meta = self._meta
+        if meta is None or not _is_of(meta, pose):
             meta = self._meta = ask_json(self._session, self._keys.pose_meta, timeout_s=timeout_s)
-            names = _names(meta, pose)
-            if names is None:
+            if not _is_of(meta, pose):
                 raise NoAnswer(
                     f"{self._keys.pose_meta}: the names given are for model {meta.get('model')!r}, "
                     f"the pose is of {pose.model_sha256!r} with {len(pose.degrees)} rotations"
                 )
-        return names
+        return meta
+
+    def rotations(self, pose: Pose, *, timeout_s: float = 2.0) -> tuple[str, ...]:
+        """Names of the pose's rotations, in order. Raises NoAnswer as ``meta``."""
+        return tuple(str(name) for name in self.meta(pose, timeout_s=timeout_s)["rotations"])
 
     def explanation(self) -> str:
         """Why the glove is served as it is: why without a model, or not with the newest; "" if all is well.
@@ -242,7 +251,7 @@ class PoseSubscriber:
             return
         with self._changed:
             if self._order.accept(pose):
-                self._latest, self._latest_at, self._fresh = pose, time.monotonic(), True
+                self._latest, self._latest_at, self._fresh = pose, clock_ns(), True
                 self._changed.notify_all()
 
     def _hear_meta(self, sample: zenoh.Sample) -> None:
@@ -258,10 +267,8 @@ class PoseSubscriber:
                 _LOG.exception("%s: on_pose failed for frame %d", self._keys.pose, pose.sequence)
 
 
-def _names(meta: dict[str, Any] | None, pose: Pose) -> tuple[str, ...] | None:
-    """The rotation names in ``meta`` if they are those of the pose's model."""
-    if meta is None or meta.get("model") != pose.model_sha256:
-        return None
+def _is_of(meta: dict[str, Any], pose: Pose) -> bool:
+    """Whether ``meta`` tells what the numbers of ``pose`` are: of the same model, one name each."""
     names = meta.get("rotations")
     fits = isinstance(names, list) and len(names) == len(pose.degrees)
-    return tuple(str(name) for name in names) if fits and names is not None else None
+    return fits and meta.get("model") == pose.model_sha256

@@ -38,6 +38,7 @@ from glovecal_client.session import ask, ask_json, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.skeleton import skeleton_from_document
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.picture_reader import MissingPictures, NewestPicture, NumberedPicture
 from glovecal_service.camera.tracking_setup import RATE_HZ, RenderedGlove
@@ -109,6 +110,7 @@ def test_a_camera_is_a_glove_like_any_other(
         assert pose.too_uncertain == unsure.any()
         meta = ask_json(session, "glovecal/lab/drawn/pose/meta")
         assert meta["method"] == "colour_glove_ik"
+        assert skeleton_from_document(meta["skeleton"]).hand == meta["hand"] == "right"
         assert ask_json(session, "glovecal/lab/drawn/meta")["simulated"] is True
 
         camera = eventually(lambda: told(session, "drawn", "tracked", 5), "five poses are told")

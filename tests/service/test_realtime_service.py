@@ -32,6 +32,7 @@ from glovecal_client.wire.frame import encode_frame
 from glovecal_client.wire.pose import Pose, decode_pose
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.predictor import GlovePredictor
+from glovecal_models.hand.skeleton import Skeleton, skeleton_from_document
 from glovecal_service.realtime.model_watcher import choose
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.serve import real_time
@@ -139,6 +140,26 @@ def test_a_glove_of_the_other_hand_is_told_with_its_first_frames(
         eventually(told, "the page's row")
     glove.say_meta(hand="right")
     eventually(lambda: not ask_meta(session, glove)["sentence"], "exchanged")
+
+
+def test_pose_meta_holds_the_wearers_hand_for_whoever_draws_it(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "hanna", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-hanna", subject="hanna")
+    glove.say_meta()
+    meta = eventually(lambda: served(session, glove, model_id), "the glove is served")
+    assert (meta["hand"], meta["skeleton"]) == ("unknown", None)
+    store.subjects.measure("hanna", {"hand_length": 182.0}, hand="left")
+
+    def drawn(hand: str) -> Skeleton | None:
+        found = ask_meta(session, glove)
+        return skeleton_from_document(found["skeleton"]) if found.get("hand") == hand else None
+
+    as_said = store.subjects.get("hanna").skeleton
+    assert eventually(lambda: drawn("left"), "the subject's hand") == as_said("left")
+    glove.say_meta(hand="right")
+    assert eventually(lambda: drawn("right"), "the glove's hand") == as_said("right")
 
 
 def test_effects_are_told_the_wearing_and_the_context(

@@ -12,6 +12,8 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.effect_correction import EffectCorrection, SignalScale
 from glovecal_models.calibration.unseen_wearing import UnseenWearing
 from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_models.hand.rotations import PALM
+from glovecal_models.hand.skeleton import Palm
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.names import did_you_mean
 from glovecal_models.regression.linear_regressor import LinearRegressor
@@ -143,6 +145,11 @@ class CalibrationModel:
         if any(item.of_wearings and item.of_wearings.knows(wearing) for item in self.effects):
             return True
         return None if self.unseen_wearing is None else self.unseen_wearing.is_seen(wearing)
+
+    @property
+    def palm(self) -> Palm:
+        """Of the hand that shows this model's angles: a template that measures the palm arches it."""
+        return "arching" if self.method == "template" and PALM in self.rotation_names else "rigid"
 
     @property
     def rotation_names(self) -> tuple[str, ...]:

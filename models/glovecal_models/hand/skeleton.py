@@ -52,7 +52,7 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.dimensions import DIMENSIONS, HandDimensions
 from glovecal_models.hand.rotations import (
     ACTIVE_RANGE_DEG,
     ARCHING_ROTATIONS,
@@ -64,6 +64,7 @@ from glovecal_models.hand.rotations import (
     RULES,
     WRIST,
     Handedness,
+    known_hand,
 )
 from glovecal_models.names import did_you_mean
 
@@ -384,3 +385,100 @@ def _rotation(name: str) -> dict[str, Any]:
     else:
         missing = {"rule": None, "rest": FLAT_PALM_DEG if name == PALM else REST_DEG[name]}
     return {"name": name, "low": low, "high": high, **missing}
+
+
+_OFF_UNIT = 1e-6
+"""By how much the length of an axis or a quaternion may differ from 1."""
+_LEAST_MM, _MOST_MM = 0.0, 1000.0
+
+
+def skeleton_from_document(document: Any) -> Skeleton:
+    """The skeleton that ``skeleton_document`` wrote. Raises BadInput for anything else."""
+    whole = _table(document, "skeleton")
+    fixed = {"format": FORMAT, "length_unit": "mm", "angle_unit": "deg"}
+    for key, expected in fixed.items():
+        if whole.get(key) != expected:
+            raise BadInput(f"skeleton: {key} is {_shown(whole.get(key))}, expected {expected!r}")
+    hand = known_hand(whole.get("hand"))
+    if hand is None:
+        raise BadInput(f"skeleton: hand is {_shown(whole.get('hand'))}, expected 'right' or 'left'")
+    joints: list[Joint] = []
+    for item in _list(whole, "joints"):
+        joints.append(_joint(item, [joint.name for joint in joints]))
+    tips = [_tip(item, [joint.name for joint in joints]) for item in _list(whole, "tips")]
+    if [tip.finger for tip in tips] != list(FINGERS):
+        raise BadInput(f"skeleton: tips are not those of {', '.join(FINGERS.values())}, in this order")
+    sizes = _table(whole.get("dimensions"), "skeleton: dimensions")
+    measured = [name for name in _list(sizes, "measured") if name in DIMENSIONS]
+    lengths_mm = {
+        name: _number(size, f"skeleton: size {name}", _LEAST_MM)
+        for name, size in _table(sizes.get("sizes"), "skeleton: sizes").items()
+    }
+    return Skeleton(hand, HandDimensions(lengths_mm, tuple(measured)), tuple(joints), tuple(tips))
+
+
+def _joint(item: Any, before: Sequence[str]) -> Joint:
+    joint = _table(item, "skeleton: joint")
+    name, parent = joint.get("name"), joint.get("parent")
+    if not isinstance(name, str) or name in before:
+        raise BadInput(f"skeleton: joint {_shown(name)} has no name of its own")
+    if parent not in before and not (parent is None and not before):
+        raise BadInput(f"skeleton: joint {name} hangs on {_shown(parent)}, which is no joint before it")
+    what = f"skeleton: joint {name}"
+    rotations = _table(joint.get("rotations"), f"{what}: rotations")
+    for unknown in set(rotations).difference(ARCHING_ROTATIONS):
+        raise BadInput(f"{what}: no rotation {unknown!r}; {did_you_mean(unknown, ARCHING_ROTATIONS)}")
+    weights = {each: _number(weight, f"{what}: weight of {each}") for each, weight in rotations.items()}
+    offset_mm = _numbers(joint.get("offset"), 3, f"{what}: offset")
+    orientation = _unit(joint.get("orientation"), 4, f"{what}: orientation")
+    return Joint(name, parent, offset_mm, orientation, _unit(joint.get("axis"), 3, f"{what}: axis"), weights)
+
+
+def _tip(item: Any, joints: Sequence[str]) -> Tip:
+    tip = _table(item, "skeleton: tip")
+    finger = next((key for key, name in FINGERS.items() if name == tip.get("finger")), None)
+    if finger is None or tip.get("joint") not in joints:
+        raise BadInput(
+            f"skeleton: tip of {_shown(tip.get('finger'))} on {_shown(tip.get('joint'))}; expected one of "
+            f"{', '.join(FINGERS.values())}, on a joint of the skeleton"
+        )
+    return Tip(finger, tip["joint"], _numbers(tip.get("offset"), 3, f"skeleton: tip of {FINGERS[finger]}"))
+
+
+def _table(value: Any, what: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise BadInput(f"{what} is {_shown(value)}, expected a JSON object")
+    return value
+
+
+def _list(table: Mapping[str, Any], key: str) -> list[Any]:
+    value = table.get(key)
+    if not isinstance(value, list):
+        raise BadInput(f"skeleton: {key} is {_shown(value)}, expected a list")
+    return value
+
+
+def _number(value: Any, what: str, least: float = -_MOST_MM) -> float:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not least <= value <= _MOST_MM:
+        raise BadInput(f"{what} is {_shown(value)}, expected a number from {least:g} to {_MOST_MM:g}")
+    return float(value)
+
+
+def _numbers(value: Any, count: int, what: str) -> Any:
+    if not isinstance(value, list) or len(value) != count:
+        raise BadInput(f"{what} is {_shown(value)}, expected {count} numbers")
+    return tuple(_number(each, what) for each in value)
+
+
+def _unit(value: Any, count: int, what: str) -> Any:
+    found = _numbers(value, count, what)
+    if abs(math.hypot(*found) - 1.0) > _OFF_UNIT:
+        raise BadInput(f"{what} has length {math.hypot(*found):g}, expected 1")
+    return found
+
+
+def _shown(value: Any) -> str:
+    """Of a value that somebody sent, so much that it is recognised."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

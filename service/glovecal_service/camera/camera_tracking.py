@@ -24,6 +24,7 @@ from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES, PoseEstimate
 from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.hand.skeleton import skeleton_document
 from glovecal_models.names import did_you_mean
 from glovecal_service.camera.camera_link import HAND, NO_HAND, CameraAnswers, CameraHealth, CameraLink
 from glovecal_service.camera.camera_settings import CameraSettings
@@ -343,6 +344,8 @@ class CameraTracking:
             "model_simulated": False,
             "effects": [],
             "rotations": [] if setup is None else list(FINGER_ROTATIONS),
+            "hand": settings.hand,
+            "skeleton": None if setup is None else skeleton_document(setup.hand.skin.skeleton),
         }
 
     @property

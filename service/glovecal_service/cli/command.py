@@ -25,6 +25,7 @@ from glovecal_service.cli.asking import verb, verb_at_once
 from glovecal_service.cli.camera import cameras
 from glovecal_service.cli.effect import catalogue, changes, improvement
 from glovecal_service.cli.glove import (
+    bridge,
     capture,
     card,
     card_session,
@@ -69,6 +70,7 @@ app.command("completion", rich_help_panel=START)(completion.completion)
 app.command("capture", cls=capture.WithDeviceOptions, rich_help_panel=GLOVES)(capture.capture)
 app.command("find-port", rich_help_panel=GLOVES)(find_port.find_port)
 app.command("watch", rich_help_panel=GLOVES)(watch.watch)
+app.command("bridge", cls=bridge.WithBridgeOptions, rich_help_panel=GLOVES)(bridge.bridge)
 app.command("doctor", rich_help_panel=GLOVES)(doctor.doctor)
 app.command("emulate", cls=emulate.WithFaults, rich_help_panel=GLOVES)(emulate.emulate)
 app.command("card", rich_help_panel=GLOVES)(card_session.card)

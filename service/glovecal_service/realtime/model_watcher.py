@@ -17,6 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from glovecal_models.calibration.artifact import load
 from glovecal_models.errors import BadInput, DamagedArtifact, GlovecalError
 from glovecal_models.hand.rotations import Handedness, is_of_hand, known_hand
+from glovecal_models.hand.skeleton import skeleton_document
 from glovecal_models.takes.take import KnownLatency
 from glovecal_service.plain import reason_of
 from glovecal_service.realtime.glove_lanes import GlovePipeline
@@ -51,13 +52,29 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
     A damaged or missing artifact is named in the sentence with what to do; a model that is in use stays, else
     the one that was active before it is taken. Raises StoreError when the database does not answer.
     """
+    serving = _chosen(store, glove, meta, prepared)
+    if serving.subject is None:
+        return serving
+    subject = store.subjects.get(serving.subject)
+    hand = serving.hand or subject.known_hand
+    if hand is None:
+        return serving
+    palm = "rigid" if serving.model is None else serving.model.model.palm
+    return replace(serving, hand=hand, skeleton=skeleton_document(subject.skeleton(hand, palm)))
+
+
+def _chosen(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Prepared) -> Serving:
+    """As ``choose``; the hand as far as the glove or the model says it, and no skeleton."""
     try:
         record = store.gloves.get(glove)
     except NotFound:
         return Serving(sentence=f"glove {glove} has not said yet which layout it has")
     subject, layout = record.subject, record.layout
     run_id = str((meta or {}).get("run_id") or "")
-    serving = Serving(subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency)
+    hand = known_hand((meta or {}).get("hand"))
+    serving = Serving(
+        subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency, hand=hand
+    )
     if layout is None:
         return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
     if subject is None:
@@ -73,7 +90,6 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
         return replace(serving, sentence=sentence)
     sent = _sensors_sent(store, layout, meta)
     layouts = dict.fromkeys(model.layout for model in models)
-    hand = known_hand((meta or {}).get("hand"))
     active = [found for name in layouts if (found := _active(store, subject, name, hand)) is not None]
     fitting = [item for item in active if _fits(item, layout, sent)]
     if not fitting:
@@ -86,6 +102,7 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
     found = _first_that_loads(store, chain, newest.record, serving, sent, prepared)
     return replace(
         found,
+        hand=hand or newest.record.hand,
         sentence="; ".join(filter(None, [_other_hand(store, newest.record, glove, hand), found.sentence])),
     )
 
@@ -380,7 +397,10 @@ class ModelWatcher:
         sentence = f"the model stays: {problem}"
         wearing, run_id, late_s = known.get("wearing"), known.get("run_id", ""), known.get("glove_latency_s")
         latency = None if late_s is None else KnownLatency(late_s, known["glove_latency_sd_s"])
-        return Serving(known.get("subject"), known.get("layout"), model, sentence, wearing, run_id, latency)
+        return Serving(
+            known.get("subject"), known.get("layout"), model, sentence, wearing, run_id, latency,
+            known_hand(known.get("hand")), known.get("skeleton"),
+        )  # fmt: skip
 
     def _serve(self, glove: str, serving: Serving) -> None:
         """Say first what the poses will mean, then let the next frame have it."""

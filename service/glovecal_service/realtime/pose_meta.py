@@ -17,6 +17,7 @@ import zenoh
 from glovecal_client.errors import BadName, NoAnswer
 from glovecal_client.keys import JSON_ENCODING, GloveKeys, all_gloves, parse_glove_key
 from glovecal_client.session import ask, json_object
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.take import KnownLatency
 from glovecal_service.incoming.arrivals import Arrivals
 from glovecal_service.realtime.glove_lanes import GlovePipeline
@@ -36,6 +37,9 @@ class Serving:
     """The run of the capture daemon that this was decided for."""
     latency: KnownLatency | None = None
     """How late the glove is known to be: the poses' times and ages hold it."""
+    hand: Handedness | None = None
+    skeleton: dict[str, Any] | None = None
+    """The wearer's hand, ``skeleton_document``; None where nobody said which hand or who wears it."""
 
     def document(self, glove: str) -> dict[str, Any]:
         """``rotations`` are in the order of the pose's numbers."""
@@ -55,6 +59,8 @@ class Serving:
             "model_simulated": None if model is None else model.simulated,
             "effects": [] if model is None else list(model.effects),
             "rotations": [] if model is None else list(model.rotations),
+            "hand": self.hand or "unknown",
+            "skeleton": self.skeleton,
         }
 
 

@@ -73,6 +73,7 @@ class Subjects:
             require_subject(connection, name)
             changed = update(tables.subjects).where(tables.subjects.c.name == name)
             connection.execute(changed.values(**values))
+            grow_revision(connection)  # poses go with the hand that draws them
             return require_subject(connection, name)
 
     def remove(self, name: str) -> None:

@@ -106,6 +106,7 @@ def test_noisy_samples_give_what_another_least_squares_gives() -> None:
 def test_without_a_measured_palm_the_little_finger_follows_its_own_sensor_alone() -> None:
     names = [name for name in OWN if name != "PALM_ARCH"]
     model = trained(taken(names))
+    assert (model.palm, trained(taken(OWN)).palm) == ("rigid", "arching")
     assert "PALM_ARCH" not in model.rotation_names
     assert planes(model)["P_MCP"][0][1] == 0.0
 

@@ -88,6 +88,11 @@ class Started(subprocess.Popen[str]):
         self._file, self._complaints = tempfile.TemporaryFile(), ""  # noqa: SIM115  # closed by communicate
         super().__init__(command, stdout=subprocess.PIPE, stderr=self._file, text=True, **options)
 
+    @property
+    def so_far(self) -> str:
+        """What it has complained of while it runs; where it goes on writing stays as it is."""
+        return os.pread(self._file.fileno(), 1_000_000, 0).decode(errors="replace")
+
     def communicate(self, input: str | None = None, timeout: float | None = None) -> tuple[str, str]:
         out, _ = super().communicate(input, timeout)
         if not self._file.closed:

@@ -1,0 +1,103 @@
+"""A pose on its way through a bridge: with names of its rotations, whose hand it is, and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from glovecal_client.wire.pose import Pose, RotationFlag
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.bones import HandBones
+from glovecal_models.hand.rotations import Handedness, completed, known_hand
+from glovecal_models.hand.skeleton import Skeleton, skeleton_from_document
+
+PoseState = Literal["live", "stale", "uncalibrated"]
+NO_HAND = (
+    "nobody said which hand it is on, so its bones are not known; say so: "
+    "glovecal subject measure {subject} --hand right"
+)
+UNUSABLE = RotationFlag.TOO_UNCERTAIN | RotationFlag.FAULTY_SENSOR
+
+
+class PoseMeaning:
+    """What ``pose/meta`` says of a model's poses. Raises BadInput where rotations have no names."""
+
+    def __init__(self, document: Mapping[str, Any]) -> None:
+        self.document = document
+        self.rotations = tuple(str(name) for name in document["rotations"])
+        self.hand: Handedness | None = known_hand(document.get("hand"))
+        self.skeleton: Skeleton | None = None
+        """None where nobody said which hand it is, or what was said is no skeleton."""
+        self.problem = ""
+        """Why the bones are not known, a sentence."""
+        if document.get("skeleton") is None:
+            if self.rotations:
+                self.problem = NO_HAND.format(subject=document.get("subject") or "SUBJECT")
+        else:
+            try:
+                self.skeleton = skeleton_from_document(document["skeleton"])
+            except BadInput as error:
+                self.problem = str(error)
+
+
+@dataclass(frozen=True)
+class GlovePose:
+    glove: str
+    pose: Pose
+    meaning: PoseMeaning
+    arrived_ns: int
+    """When it reached this process, ``clock_ns``."""
+    is_of_this_computer: bool
+    """Whether its time is by this computer's monotonic clock."""
+
+    @property
+    def state(self) -> PoseState:
+        return "stale" if self.pose.stale else "uncalibrated" if self.pose.uncalibrated else "live"
+
+    @cached_property
+    def usable(self) -> np.ndarray:
+        """(R,) bool: neither too uncertain nor held because a sensor fails."""
+        return (self.pose.rotation_flags & UNUSABLE) == 0
+
+    @property
+    def radians(self) -> dict[str, float]:
+        """The usable angles by rotation."""
+        angles = np.radians(self.pose.degrees.astype(float)).tolist()
+        return {
+            name: angle
+            for name, angle, is_usable in zip(
+                self.meaning.rotations, angles, self.usable.tolist(), strict=True
+            )
+            if is_usable
+        }
+
+
+class BonesInMotion:
+    """The bones of one glove's hand as its poses come.
+
+    An angle that is not usable keeps its last usable value; what was never usable follows a rule, or rests.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[str, float] = {}
+        self._model: str | None = None
+        self._bones: HandBones | None = None
+
+    def orientations(self, hand: GlovePose) -> tuple[HandBones, np.ndarray] | None:
+        """The bones and their orientations (B, 3, 3) in the forearm's frame; None where it is not known which
+        hand the glove is on."""
+        skeleton = hand.meaning.skeleton
+        if skeleton is None:
+            return None
+        if self._bones is None or self._bones.skeleton is not skeleton:
+            self._bones = HandBones.of(skeleton)
+        if hand.pose.model_sha256 != self._model:
+            self._last, self._model = {}, hand.pose.model_sha256
+        usable = zip(hand.meaning.rotations, hand.pose.degrees.tolist(), hand.usable.tolist(), strict=True)
+        self._last |= {name: degrees for name, degrees, is_usable in usable if is_usable}
+        angles_deg = completed(list(self._last), np.array([list(self._last.values())]), skeleton.rotations)
+        return self._bones, self._bones.orientations(angles_deg)[0]
