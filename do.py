@@ -23,6 +23,8 @@
                             fresh trixie -- tests/client: these tests only)
     python3 do.py containers  both container images built, run, killed and upgraded (needs podman;
                             --debootstrap where no image registry is reached; half an hour)
+    python3 do.py blender   the Blender extension as a zip in dist/; --platform all: for every system;
+                            --test: exports and live hands in Blender's own module, as a table (3 minutes)
     python3 do.py picture   pictures of the studio for README and docs/, from running pages (needs Chromium)
 
 uv is installed into .tools and the locked packages into .venv; nothing outside this folder is touched
@@ -45,6 +47,7 @@ ROOT = Path(__file__).resolve().parent
 TOOLS = ROOT / ".tools"
 SMOKE = "--smoke"
 SIMULATED = ("tests/simulated",)
+BLENDER = ("client/blender", "tests/service/exports")
 STUDIO = ("tests/service/studio", "tests/service")
 SMOKE_TESTS = ("tests/models/test_layout.py", "tests/architecture/test_surroundings.py")
 PUBLIC = ("glovecal", "glovecal_client")
@@ -240,6 +243,17 @@ def containers(arguments: list[str]) -> int:
     return run("python", "tests/containers/containers.py", *arguments, dev=True, beside=("tests/fresh",))
 
 
+def blender(arguments: list[str]) -> int:
+    """Wheels for other systems are fetched by this Python's pip."""
+    if SMOKE in arguments:
+        return run("python", "client/blender/build_extension.py", "--help")
+    if "--test" in arguments:
+        rest = [each for each in arguments if each != "--test"]
+        script = ("tests/blender/try_blender.py", "--uv", uv()[0], "--pip", sys.executable, *rest)
+        return run("python", *script, dev=True, beside=BLENDER)
+    return run("python", "client/blender/build_extension.py", "--pip", sys.executable, *arguments, dev=True)
+
+
 def docs(arguments: list[str]) -> int:
     """A warning is an error: a link that leads nowhere must not get into the site. docs FOLDER: elsewhere."""
     if {"--compare", "--write"} & set(arguments):
@@ -284,6 +298,7 @@ VERBS = {
     "study": study,
     "fresh": fresh,
     "containers": containers,
+    "blender": blender,
     "picture": picture,
     "docs": docs,
 }

@@ -21,6 +21,7 @@ OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/stud
 OF_DO_PY["--simulated"] = "client/examples/stream/hand_stream.py"
 OF_DO_PY["--confusion"] = "client/examples/spell.py"
 OF_DO_PY["--shapes"] = "tests/study/tracked_errors.py"
+OF_DO_PY["--platform"] = "client/blender/build_extension.py"
 CAPTURE = "client/glovecal_client/capture/command.py"
 OF_DO_PY |= dict.fromkeys(("--install-unit", "--log-limit"), CAPTURE)  # of glovecal-capture alone
 COMMAND: Any = command()

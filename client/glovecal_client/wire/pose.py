@@ -44,6 +44,10 @@ class RotationFlag(IntFlag):
     FAULTY_SENSOR = 8
 
 
+UNUSABLE = RotationFlag.TOO_UNCERTAIN | RotationFlag.FAULTY_SENSOR
+"""Flags of a rotation whose angle is not to be used."""
+
+
 def _no_values() -> np.ndarray:
     return np.empty(0, np.float32)
 
@@ -83,6 +87,11 @@ class Pose:
     def words(self) -> tuple[str, ...]:
         """The flags in words, such as ``("uncalibrated", "simulated")``; unknown bits have none."""
         return tuple((flag.name or "").lower().replace("_", " ") for flag in PoseFlag if self.flags & flag)
+
+    @property
+    def usable(self) -> np.ndarray:
+        """(R,) bool: neither too uncertain nor held because a sensor fails."""
+        return (self.rotation_flags & UNUSABLE) == 0
 
     @property
     def uncalibrated(self) -> bool:

@@ -212,10 +212,14 @@ class Skeleton:
     @cached_property
     def turns(self) -> np.ndarray:
         """(J, 3, 3, 3): a joint's turn is the first matrix + sin(angle) second + (1 - cos(angle)) third."""
-        from scipy.spatial.transform import Rotation  # a fifth of what starting the service costs
-
-        quaternions = [joint.orientation for joint in self.joints]
-        oriented = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+        w, x, y, z = np.array([joint.orientation for joint in self.joints]).T
+        oriented = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        ).transpose(2, 0, 1)
         cross = np.cross(self.axes[:, None, :], np.eye(3)).swapaxes(1, 2)
         return np.stack([oriented, oriented @ cross, oriented @ cross @ cross], axis=1)
 

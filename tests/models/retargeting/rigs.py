@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from glovecal_models.hand.bones import HAND, PHALANGES, HandBones
 from glovecal_models.hand.dimensions import HandDimensions
+from glovecal_models.hand.retargeting.rig import Rig, RigBone
 from glovecal_models.hand.rotations import VIRTUAL_SHARES, Handedness
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.retargeting.rig import Rig, RigBone
 
 X, Y, Z = np.eye(3)
 

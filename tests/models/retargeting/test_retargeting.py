@@ -17,11 +17,11 @@ from rigs import CONVENTIONS, TO_WORLD, angles_of, rig_like
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HAND, PHALANGES, HandBones
+from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.rig import Rig, hand_of
+from glovecal_models.hand.retargeting.touches import FAR_MM, Touches
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS
 from glovecal_models.hand.skeleton import hand_skeleton
-from glovecal_models.retargeting.retarget import Retargeting
-from glovecal_models.retargeting.rig import Rig, hand_of
-from glovecal_models.retargeting.touches import FAR_MM, Touches
 
 each_rig = pytest.mark.parametrize("convention", CONVENTIONS)
 each_hand = pytest.mark.parametrize("hand", HANDS)

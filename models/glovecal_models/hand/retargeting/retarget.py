@@ -16,9 +16,9 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HAND, METACARPAL, PHALANGES, HandBones
+from glovecal_models.hand.retargeting.rig import Rig, hand_of
 from glovecal_models.hand.rotations import VIRTUAL_SHARES
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.retargeting.rig import Rig, hand_of
 
 _THUMB = f"thumb_{METACARPAL}"
 SHORTEST_BACK = 0.3

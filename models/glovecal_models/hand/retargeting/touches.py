@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from glovecal_models.hand.bones import HAND, PHALANGES
-from glovecal_models.retargeting.retarget import Retargeting, direction
+from glovecal_models.hand.retargeting.retarget import Retargeting, direction
 
 FAR_MM, NEAR_MM = 35.0, 12.0
 """Between the hand's own fingertips: from where on joints are turned further, and where all of it is done."""
