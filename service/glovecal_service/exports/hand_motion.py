@@ -140,3 +140,5 @@ class ExportFormat:
     accuracy: str
     """What it holds of the angles' standard deviations and flags."""
     read_by: str
+    needs: tuple[str, str] | None = None
+    """Module and package of an extra, where it needs one."""

@@ -22,7 +22,7 @@ from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
-from glovecal_service.exports.formats import format_of, require_held
+from glovecal_service.exports.formats import format_of, require_possible
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
 from glovecal_service.exports.resampling import Resampling
 from glovecal_service.store.records import SubjectRecord
@@ -138,7 +138,7 @@ class MotionFile:
                 "both takes are of the same hand; if one is not, say so, in the order of the takes: "
                 "--hand right --hand left"
             )
-        require_held(format_of(self.path.name), self.content)
+        require_possible(format_of(self.path.name), self.content)
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
         if self.frames > MOST_FRAMES:

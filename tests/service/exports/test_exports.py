@@ -17,7 +17,7 @@ from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.layout import Layout
-from glovecal_service.exports.formats import FORMATS, format_of, require_held
+from glovecal_service.exports.formats import FORMATS, format_of, require_possible
 from glovecal_service.exports.hand_motion import CONTENTS, HandMotion, on_one_time
 from glovecal_service.exports.marker_tables import markers, trc_text
 
@@ -147,7 +147,7 @@ def test_a_take_without_a_model_has_raw_readings_only(tmp_path: Path) -> None:
             chosen.write([bare], "raw", tmp_path / f"raw{suffix}")
         else:
             with pytest.raises(BadInput, match=rf"\{suffix} cannot hold raw; \.trc, \.csv, \.parquet can"):
-                require_held(chosen, "raw")
+                require_possible(chosen, "raw")
         for content in ("angles", "joints"):
             with pytest.raises(BadInput, match="need a model"):
                 chosen.write([bare], content, tmp_path / f"x{suffix}")

@@ -1,0 +1,48 @@
+"""C3D, the file of movement laboratories: joints as points in millimetres, on even steps (extra ``c3d``)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_service.exports.body_motion import even_steps
+from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion, at_times
+from glovecal_service.exports.marker_tables import HAND_AXES, markers
+
+MOST_FRAMES = 65_535
+"""The file counts them in 16 bits."""
+STEP_DIGITS = 9
+
+
+def write_c3d(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
+    """Hands on one time. A point that is not known is marked as such. Raises BadInput."""
+    import ezc3d  # an extra
+
+    time_s, step_s = even_steps(motions[0].time_s, STEP_DIGITS)
+    if len(time_s) > MOST_FRAMES:
+        raise BadInput(f"{len(time_s)} frames are too many for C3D; export at most {MOST_FRAMES}")
+    points: dict[str, np.ndarray] = {}
+    for motion in motions:
+        points |= markers(at_times(motion, time_s), content)
+    made = ezc3d.c3d()
+    parameters = made["parameters"]["POINT"]
+    parameters["RATE"]["value"] = [1 / step_s]
+    parameters["UNITS"]["value"] = ["mm"]
+    parameters["LABELS"]["value"] = list(points)
+    made["data"]["points"] = np.ones((4, len(points), len(time_s)))
+    made["data"]["points"][:3] = np.array(list(points.values())).transpose(2, 0, 1)
+    notes = {motion.label: dict(motion.notes) for motion in motions}
+    made.add_parameter("GLOVECAL", "SIMULATED", [int(any(motion.simulated for motion in motions))])
+    made.add_parameter("GLOVECAL", "NOTES", [json.dumps(notes)])
+    made.write(str(path))
+
+
+FORMAT = ExportFormat(
+    ".c3d", "application/octet-stream", write_c3d, ("joints",), "C3D",
+    unit="mm", axes=HAND_AXES, times="even steps", accuracy="nothing",
+    read_by="Visual3D, Nexus, OpenSim, Mokka, MATLAB", needs=("ezc3d", "ezc3d"),
+)  # fmt: skip
