@@ -74,6 +74,10 @@ class Bridge(ABC):
 
     about: ClassVar[str]
     """Which tools read it, a clause."""
+    to_set_there: ClassVar[str]
+    """What a person sets in such a tool, a clause."""
+    units: ClassVar[str]
+    """And axes, and which way is up."""
     when_stale: ClassVar[str]
     """What a receiver gets in place of live poses, a clause."""
     options: ClassVar[dict[str, str]]

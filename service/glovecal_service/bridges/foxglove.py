@@ -43,6 +43,11 @@ class FoxgloveBridge(Bridge):
     """Serves Foxglove's WebSocket protocol (foxglove.sdk.v1)."""
 
     about = "Foxglove: 3D panel, plots, recording to MCAP"
+    to_set_there = (
+        "*Open connection*, *Foxglove WebSocket*, the address that is printed; in the 3D panel the frame "
+        "`glovecal`"
+    )
+    units = "m and radians, right-handed, x to the fingers, y to the left, z up"
     when_stale = "frames and joint states stop, the topic state says why"
     options: ClassVar[dict[str, str]] = {
         "port": f"to listen on; default {DEFAULT_PORT}",

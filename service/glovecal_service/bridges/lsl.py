@@ -34,6 +34,8 @@ class LslBridge(Bridge):
     """Streams for LabRecorder and whatever else reads LSL."""
 
     about = "Lab Streaming Layer: LabRecorder, MNE, psychology and physiology labs"
+    to_set_there = "nothing: the streams are `glovecal-GLOVE`, type MoCap"
+    units = "degrees, times of the hand by LSL's clock"
     when_stale = "rows of NaN whose flags say why"
     options: ClassVar[dict[str, str]] = {
         "scope": "who can find the streams: machine (default, this computer), link (the local network), site",

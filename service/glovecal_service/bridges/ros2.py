@@ -46,6 +46,8 @@ class Ros2Bridge(Bridge):
     """Publishes to the nodes of a ROS 2 whose middleware is rmw_zenoh."""
 
     about = "ROS 2 (Jazzy and later) with rmw_zenoh: sensor_msgs/JointState"
+    to_set_there = "`RMW_IMPLEMENTATION=rmw_zenoh_cpp`; topics `/glovecal/GLOVE/joint_states`"
+    units = "radians, stamps of the capture computer's wall clock"
     when_stale = "nothing is sent"
     options: ClassVar[dict[str, str]] = {
         "to": f"HOST:PORT of the ROS 2 router (rmw_zenohd); default {DEFAULT_ROUTER}",

@@ -43,6 +43,8 @@ class VmcBridge(Bridge):
     """Sends the fingers of one or two hands to a program that shows an avatar."""
 
     about = "avatars: Unity, Warudo, VSeeFace, VMagicMirror, Unreal with VMC plug-ins"
+    to_set_there = "its VMC receiver on, at the port sent to; in EVMC4U *Bone Position Synchronize* off"
+    units = "rotations from the T-pose; Unity's axes: left-handed, y up, the avatar faces z"
     when_stale = "bones stop, /VMC/Ext/OK says tracking 0"
     options: ClassVar[dict[str, str]] = {
         "to": f"HOST:PORT where the avatar's program listens for VMC; default {DEFAULT_ADDRESS}",
