@@ -31,6 +31,8 @@ from glovecal_service.bridges.glove_pose import GlovePose, PoseMeaning
 from glovecal_service.bridges.traffic import Traffic
 
 LOOPBACK = "127.0.0.1"
+GIL_SWITCH_S = 0.0005
+"""Longest time another thread of a bridge's process keeps a pose waiting."""
 MOST_GLOVES = 16
 """That are followed where none was named."""
 _ASK_AGAIN_NS = 1_000_000_000

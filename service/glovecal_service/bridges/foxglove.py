@@ -13,14 +13,15 @@ While poses are stale or uncalibrated only the state comes. A bone whose angle i
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, ClassVar
-
-import numpy as np
 
 from glovecal_client.clock import wall_ns
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HAND, HandBones
+from glovecal_models.hand.skeleton import Quaternion as QuaternionWxyz
+from glovecal_service.bridges.bone_turns import NO_TURN
 from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
 from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
 from glovecal_service.bridges.traffic import Traffic
@@ -147,7 +148,7 @@ class _Topics:
         pose = hand.pose
         if hand.state == "live":
             stamp, log_time = _timestamp(pose.wall_ns), pose.wall_ns
-            moved = self._motion.orientations(hand)
+            moved = self._motion.turned(hand)
             if moved is not None:
                 self._frames.log(transforms(self._glove, *moved, stamp), log_time=log_time)
             self._joints.log(_joint_states(hand, stamp), log_time=log_time)
@@ -158,16 +159,12 @@ class _Topics:
         self._state.log(document, log_time=log_time)
 
 
-def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Timestamp) -> FrameTransforms:
-    """Every bone in its parent's frame, and each fingertip in that of the last bone."""
+def transforms(
+    glove: str, bones: HandBones, turned: Sequence[QuaternionWxyz], stamp: Timestamp
+) -> FrameTransforms:
+    """Every bone, turned in its parent's frame, and each fingertip in that of the last bone."""
     from foxglove.messages import FrameTransform, FrameTransforms, Quaternion, Vector3
-    from scipy.spatial.transform import Rotation
 
-    local = [
-        turned if parent is None else orientations[parent].T @ turned
-        for parent, turned in zip(bones.parents, orientations, strict=True)
-    ]
-    turns = Rotation.from_matrix(np.array(local)).as_quat().tolist()
     root = [0.0, ASIDE_M[bones.skeleton.hand], 0.0]
     rows = [
         (
@@ -176,9 +173,9 @@ def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Ti
             root if parent is None else (head / 1e3).tolist(),
             turn,
         )
-        for name, parent, head, turn in zip(bones.names, bones.parents, bones.heads_mm, turns, strict=True)
+        for name, parent, head, turn in zip(bones.names, bones.parents, bones.heads_mm, turned, strict=True)
     ]
-    still = [0.0, 0.0, 0.0, 1.0]
+    still = NO_TURN
     for bone, name in enumerate(bones.names):
         if name != HAND and bone not in bones.parents:
             finger = name.partition("_")[0]
@@ -190,7 +187,7 @@ def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Ti
             FrameTransform(
                 timestamp=stamp, parent_frame_id=parent, child_frame_id=child,
                 translation=Vector3(x=at[0], y=at[1], z=at[2]),
-                rotation=Quaternion(x=turn[0], y=turn[1], z=turn[2], w=turn[3]),
+                rotation=Quaternion(w=turn[0], x=turn[1], y=turn[2], z=turn[3]),
             )
             for parent, child, at, turn in rows
         ]

@@ -13,24 +13,25 @@ are stale or uncalibrated it comes alone, without bones; a bone whose angle is n
 
 from __future__ import annotations
 
+import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import ClassVar
 
-import numpy as np
-
 from glovecal_models.hand.bones import DISTAL, HAND, INTERMEDIATE, METACARPAL, PHALANGES, PROXIMAL, HandBones
 from glovecal_models.hand.rotations import Handedness
+from glovecal_models.hand.skeleton import Quaternion, Vector
+from glovecal_service.bridges.bone_turns import NO_TURN, inverse, product
 from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
 from glovecal_service.bridges.datagrams import DatagramSender
 from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
 from glovecal_service.bridges.traffic import Traffic
 
 DEFAULT_ADDRESS = f"{LOOPBACK}:39540"
-UNITY_AXES: dict[Handedness, np.ndarray] = {
-    "right": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
-    "left": np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+UNITY_AXES: dict[Handedness, tuple[Vector, Vector, Vector]] = {
+    "right": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    "left": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
 }
 """M of each hand: from the hand's frame to Unity's, the arm in T-pose."""
 _UNITY_FINGERS = {"thumb": "Thumb", "index": "Index", "middle": "Middle", "ring": "Ring", "pinky": "Little"}
@@ -65,7 +66,7 @@ class VmcBridge(Bridge):
         if self._sender is None:
             return
         motion = self._motions.setdefault(hand.glove, BonesInMotion())
-        moved = motion.orientations(hand) if hand.state == "live" else None
+        moved = motion.turned(hand) if hand.state == "live" else None
         self._is_sound[hand.glove] = moved is not None and bool(hand.usable.all())
         tracking = int(all(self._is_sound.values()))
         messages = [_message("/VMC/Ext/OK", "iiii", _LOADED, _CALIBRATED, _NORMAL_MODE, tracking)]
@@ -93,37 +94,35 @@ class VmcBridge(Bridge):
 
 
 def unity_fingers(
-    bones: HandBones, orientations: np.ndarray
+    bones: HandBones, turned: Sequence[Quaternion]
 ) -> Iterator[tuple[str, tuple[float, float, float, float]]]:
-    """Unity's name and local rotation (x, y, z, w) of each finger bone, of orientations (B, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
+    """Unity's name and local rotation (x, y, z, w) of each finger bone, of bones turned in their parents'
+    frames."""
     hand = bones.skeleton.hand
-    in_hand = orientations[bones.names.index(HAND)].T @ orientations
-    names, local = [], []
     for finger, parts in PHALANGES.items():
-        rest = thumb_in_t_pose(hand) if finger == "thumb" else np.eye(3)
-        carrier = np.eye(3)
+        rest = thumb_in_t_pose(hand) if finger == "thumb" else NO_TURN
         for part in parts:
-            turned = in_hand[bones.names.index(f"{finger}_{part}")] @ rest.T
-            local.append(carrier.T @ turned)
-            carrier = turned
-            part_name = (_THUMB_PARTS if finger == "thumb" else _UNITY_PARTS)[part]
-            names.append(f"{hand.capitalize()}{_UNITY_FINGERS[finger]}{part_name}")
-    axes = UNITY_AXES[hand]
-    for name, quaternion in zip(
-        names, Rotation.from_matrix(axes @ np.array(local) @ axes.T).as_quat(), strict=True
-    ):
-        x, y, z, w = quaternion.tolist()
-        yield name, (x, y, z, w)
+            bone = bones.names.index(f"{finger}_{part}")
+            local, carrier = turned[bone], bones.parents[bone]
+            if carrier is not None and bones.names[carrier] == "pinky_metacarpal":  # Unity has none
+                local, carrier = product(turned[carrier], local), bones.parents[carrier]
+            if carrier is not None and bones.names[carrier] != HAND:
+                local = product(rest, local)
+            w, *along = product(local, inverse(rest))
+            x, y, z = (-sum(m * v for m, v in zip(row, along, strict=True)) for row in UNITY_AXES[hand])
+            names = _THUMB_PARTS if finger == "thumb" else _UNITY_PARTS
+            yield f"{hand.capitalize()}{_UNITY_FINGERS[finger]}{names[part]}", (x, y, z, w)
 
 
-def thumb_in_t_pose(hand: Handedness) -> np.ndarray:
-    """Its bones' axes (3, 3) in the hand's frame: columns are along the bone, across it, out of the nail."""
-    towards_thumb = 1.0 if hand == "right" else -1.0
-    along = np.array([1.0, towards_thumb, 0.0]) / np.sqrt(2.0)
-    nail = np.array([-1.0, towards_thumb, 0.0]) / np.sqrt(2.0)
-    return np.column_stack([along, np.cross(nail, along), nail])
+def thumb_in_t_pose(hand: Handedness) -> Quaternion:
+    """Of its bones in the hand's frame: x along the bone, 45 degrees between fingers and side; z out of the
+    nail, away from the fingers."""
+    half = math.sqrt(0.5)
+    towards = half if hand == "right" else -half
+    first_about_x: Quaternion = (half, -towards, 0.0, 0.0)
+    return product(
+        (math.cos(math.pi / 8), 0.0, 0.0, math.copysign(math.sin(math.pi / 8), towards)), first_about_x
+    )
 
 
 def _bundle(messages: list[bytes]) -> bytes:

@@ -182,12 +182,24 @@ class RunningBridge:
 
 
 @contextmanager
-def running_bridge(stage: Stage, name: str, *options: object) -> Iterator[RunningBridge]:
-    """Until the block ends; it must end cleanly."""
-    process = start({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", name, "--json", *options)
+def running_bridge(service: Stage | str, name: str, *options: object) -> Iterator[RunningBridge]:
+    """Until the block ends; it must end cleanly. ``service``: a stage, or the endpoint of a router."""
+    endpoint = service if isinstance(service, str) else service.endpoint
+    process = start({"GLOVECAL_ZENOH": endpoint}, "bridge", name, "--json", *options)
     bridge = RunningBridge(process)
     try:
         yield bridge
     finally:
         if process.returncode is None:
             bridge.end()
+
+
+def refused(stage: Stage, *arguments: object) -> str:
+    """What ``glovecal bridge`` says that refuses ``arguments``, in one line."""
+    process = start({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", *arguments)
+    try:
+        _, complaints = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert process.returncode == 1, complaints
+    return " ".join(complaints.split())

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from bridge_support import FIST, FLAT, Stage, WornHand, running_bridge
-from cli_running import glovecal
+from bridge_support import FIST, FLAT, Stage, WornHand, refused, running_bridge
 from datagram_reader import datagrams
 from pythonosc.osc_bundle import OscBundle
 from realtime_support import eventually
@@ -134,7 +133,7 @@ def test_an_address_that_is_none_is_refused(stage: Stage) -> None:
         ("39540", "--to '39540' is no address; give HOST:PORT, as in 127.0.0.1:39540"),
         ("no.such.host.invalid:39540", "no computer 'no.such.host.invalid' is known here"),
     ):
-        said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "vmc", "--to", wrong).said
+        said = refused(stage, "vmc", "--to", wrong)
         assert sentence in said
-    said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "vmc", "--port", "1").said
+    said = refused(stage, "vmc", "--port", "1")
     assert "bridge vmc has no option 'port'; there are to" in said
