@@ -15,7 +15,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from glovecal_client.clock import wall_ns
 from glovecal_models.errors import BadInput
@@ -27,10 +27,10 @@ from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
 from glovecal_service.bridges.traffic import Traffic
 
 if TYPE_CHECKING:
-    from foxglove import Channel, Context, WebSocketServer
+    from foxglove import Channel, Context
     from foxglove.channels import FrameTransformsChannel, JointStatesChannel
     from foxglove.messages import FrameTransforms, JointStates, Timestamp
-    from foxglove.websocket import ChannelView, Client
+    from foxglove.websocket import ChannelView, Client, WebSocketServer
 
 DEFAULT_PORT = 8765
 ROOT_FRAME = "glovecal"
@@ -86,9 +86,10 @@ class FoxgloveBridge(Bridge):
         import foxglove
 
         self._context = foxglove.Context()
+        listener: Any = self._readers  # it has of the protocol what is called without capabilities
         try:
             self._server = foxglove.start_server(
-                name="Glovecal", host=self._host, port=self._port, server_listener=self._readers,
+                name="Glovecal", host=self._host, port=self._port, server_listener=listener,
                 context=self._context, message_backlog_size=_MOST_WAITING,
             )  # fmt: skip
         except (OSError, RuntimeError) as error:

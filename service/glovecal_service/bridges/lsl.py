@@ -98,7 +98,8 @@ class _Stream:
         )  # fmt: skip
         info.set_channel_labels(labels)
         info.set_channel_types(["Orientation"] * (len(labels) - 1) + ["Misc"])
-        info.set_channel_units(["degrees"] * (len(labels) - 1) + ["bits"])
+        units: list[str | int] = [*["degrees"] * (len(labels) - 1), "bits"]
+        info.set_channel_units(units)
         info.desc().append_child_value("hand", self._hand or "unknown")
         info.desc().append_child_value("subject", str(hand.meaning.document.get("subject") or ""))
         self.outlet: pylsl.StreamOutlet = pylsl.StreamOutlet(info)

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import zenoh
 
@@ -70,7 +70,7 @@ class Ros2Bridge(Bridge):
     @property
     def receivers(self) -> int:
         """Topics that somebody listens to."""
-        return sum(topic.publisher.matching_status.matching for topic in list(self._topics.values()))
+        return sum(topic.is_listened_to for topic in list(self._topics.values()))
 
     def send(self, hand: GlovePose) -> None:
         if hand.state != "live" or self._session is None:
@@ -127,6 +127,11 @@ class _Topic:
         )
         gid = hashlib.blake2b(token.encode(), digest_size=16).digest()
         return cls(publisher, session.liveliness().declare_token(token), gid)
+
+    @property
+    def is_listened_to(self) -> bool:
+        status: Any = self.publisher.matching_status  # no bool, whatever its stub says
+        return status.matching
 
     def put(self, message: bytes) -> None:
         self.sequence += 1

@@ -35,7 +35,8 @@ class WornHand:
     """A glove that publishes whole poses, as the service does for a calibrated one."""
 
     def __init__(self, session: zenoh.Session, glove: str, hand: Handedness) -> None:
-        self.glove, self.hand = glove, hand
+        self.glove = glove
+        self.hand: Handedness = hand
         self.keys = GloveKeys(SITE, glove)
         self.skeleton = hand_skeleton(SIZES, hand)
         self.rotations = HAND_ROTATIONS

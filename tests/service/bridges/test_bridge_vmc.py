@@ -47,7 +47,7 @@ def hand_of(
     return eventually(wanted, f"the {hand} hand")
 
 
-SIGNS = [
+SIGNS: list[tuple[Handedness, str, str, list[int]]] = [
     ("right", "I_PIP", "IndexIntermediate", [0, 0, -1]),
     ("left", "I_PIP", "IndexIntermediate", [0, 0, 1]),
     ("right", "P_MCP", "LittleProximal", [0, 0, -1]),
