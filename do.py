@@ -49,6 +49,7 @@ SMOKE = "--smoke"
 SIMULATED = ("tests/simulated",)
 BLENDER = ("client/blender", "tests/service/exports")
 STUDIO = ("tests/service/studio", "tests/service")
+BRIDGES = ("tests/service/bridges", "tests/service/cli", "tests/service")
 SMOKE_TESTS = ("tests/models/test_layout.py", "tests/architecture/test_surroundings.py")
 PUBLIC = ("glovecal", "glovecal_client")
 PYTEST = ("python", "-I", "-m", "pytest")  # -I: packages of the user's PYTHONPATH are not those of the lock
@@ -207,6 +208,8 @@ def bench(arguments: list[str]) -> int:
         return run("python", "tests/bench/bench.py", *arguments)
     if arguments[:1] == ["studio"]:
         return run("python", "tests/bench/bench.py", *arguments, dev=True, beside=STUDIO)
+    if arguments[:1] == ["bridges"]:
+        return run("python", "tests/bench/bench.py", *arguments, dev=True, beside=BRIDGES)
     if SMOKE not in arguments:
         install_gpytorch()
     return run("python", "tests/bench/bench.py", *arguments, groups=("bench",), dev=True, beside=STUDIO)

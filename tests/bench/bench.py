@@ -1,8 +1,8 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Four parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
-to pose through real zenoh, inverse kinematics against mink, and the studio's Live page in a browser. Figures
-and the picture go to a folder.
+Five parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+to pose through real zenoh, inverse kinematics against mink, the studio's Live page in a browser, and live
+bridges. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -20,15 +20,18 @@ PARTS = {
     "streaming": "streaming_bench.py",
     "inverse-kinematics": "inverse_kinematics_bench.py",
     "studio": "studio_bench.py",
+    "bridges": "bridges_bench.py",
 }
-USUAL = tuple(name for name in PARTS if name != "studio")
-"""The studio wants a browser and a quiet computer."""
+USUAL = tuple(name for name in PARTS if name not in ("studio", "bridges"))
+"""These want a quiet computer, the studio a browser too."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: not studio")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"{' or '.join(PARTS)}; default: {', '.join(USUAL)}"
+    )
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
     parser.add_argument("--smoke", action="store_true", help="tiny runs, in a temporary folder unless named")
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")

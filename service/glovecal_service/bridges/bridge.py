@@ -31,6 +31,8 @@ from glovecal_service.bridges.glove_pose import GlovePose, PoseMeaning
 from glovecal_service.bridges.traffic import Traffic
 
 LOOPBACK = "127.0.0.1"
+GIL_SWITCH_S = 0.0005
+"""Longest time another thread of a bridge's process keeps a pose waiting."""
 MOST_GLOVES = 16
 """That are followed where none was named."""
 _ASK_AGAIN_NS = 1_000_000_000
@@ -74,6 +76,10 @@ class Bridge(ABC):
 
     about: ClassVar[str]
     """Which tools read it, a clause."""
+    to_set_there: ClassVar[str]
+    """What a person sets in such a tool, a clause."""
+    units: ClassVar[str]
+    """And axes, and which way is up."""
     when_stale: ClassVar[str]
     """What a receiver gets in place of live poses, a clause."""
     options: ClassVar[dict[str, str]]

@@ -13,23 +13,24 @@ While poses are stale or uncalibrated only the state comes. A bone whose angle i
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, ClassVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from glovecal_client.clock import wall_ns
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HAND, HandBones
+from glovecal_models.hand.skeleton import Quaternion as QuaternionWxyz
+from glovecal_service.bridges.bone_turns import NO_TURN
 from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
 from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
 from glovecal_service.bridges.traffic import Traffic
 
 if TYPE_CHECKING:
-    from foxglove import Channel, Context, WebSocketServer
+    from foxglove import Channel, Context
     from foxglove.channels import FrameTransformsChannel, JointStatesChannel
     from foxglove.messages import FrameTransforms, JointStates, Timestamp
-    from foxglove.websocket import ChannelView, Client
+    from foxglove.websocket import ChannelView, Client, WebSocketServer
 
 DEFAULT_PORT = 8765
 ROOT_FRAME = "glovecal"
@@ -43,6 +44,11 @@ class FoxgloveBridge(Bridge):
     """Serves Foxglove's WebSocket protocol (foxglove.sdk.v1)."""
 
     about = "Foxglove: 3D panel, plots, recording to MCAP"
+    to_set_there = (
+        "*Open connection*, *Foxglove WebSocket*, the address that is printed; in the 3D panel the frame "
+        "`glovecal`"
+    )
+    units = "m and radians, right-handed, x to the fingers, y to the left, z up"
     when_stale = "frames and joint states stop, the topic state says why"
     options: ClassVar[dict[str, str]] = {
         "port": f"to listen on; default {DEFAULT_PORT}",
@@ -80,9 +86,10 @@ class FoxgloveBridge(Bridge):
         import foxglove
 
         self._context = foxglove.Context()
+        listener: Any = self._readers  # it has of the protocol what is called without capabilities
         try:
             self._server = foxglove.start_server(
-                name="Glovecal", host=self._host, port=self._port, server_listener=self._readers,
+                name="Glovecal", host=self._host, port=self._port, server_listener=listener,
                 context=self._context, message_backlog_size=_MOST_WAITING,
             )  # fmt: skip
         except (OSError, RuntimeError) as error:
@@ -142,7 +149,7 @@ class _Topics:
         pose = hand.pose
         if hand.state == "live":
             stamp, log_time = _timestamp(pose.wall_ns), pose.wall_ns
-            moved = self._motion.orientations(hand)
+            moved = self._motion.turned(hand)
             if moved is not None:
                 self._frames.log(transforms(self._glove, *moved, stamp), log_time=log_time)
             self._joints.log(_joint_states(hand, stamp), log_time=log_time)
@@ -153,16 +160,12 @@ class _Topics:
         self._state.log(document, log_time=log_time)
 
 
-def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Timestamp) -> FrameTransforms:
-    """Every bone in its parent's frame, and each fingertip in that of the last bone."""
+def transforms(
+    glove: str, bones: HandBones, turned: Sequence[QuaternionWxyz], stamp: Timestamp
+) -> FrameTransforms:
+    """Every bone, turned in its parent's frame, and each fingertip in that of the last bone."""
     from foxglove.messages import FrameTransform, FrameTransforms, Quaternion, Vector3
-    from scipy.spatial.transform import Rotation
 
-    local = [
-        turned if parent is None else orientations[parent].T @ turned
-        for parent, turned in zip(bones.parents, orientations, strict=True)
-    ]
-    turns = Rotation.from_matrix(np.array(local)).as_quat().tolist()
     root = [0.0, ASIDE_M[bones.skeleton.hand], 0.0]
     rows = [
         (
@@ -171,9 +174,9 @@ def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Ti
             root if parent is None else (head / 1e3).tolist(),
             turn,
         )
-        for name, parent, head, turn in zip(bones.names, bones.parents, bones.heads_mm, turns, strict=True)
+        for name, parent, head, turn in zip(bones.names, bones.parents, bones.heads_mm, turned, strict=True)
     ]
-    still = [0.0, 0.0, 0.0, 1.0]
+    still = NO_TURN
     for bone, name in enumerate(bones.names):
         if name != HAND and bone not in bones.parents:
             finger = name.partition("_")[0]
@@ -185,7 +188,7 @@ def transforms(glove: str, bones: HandBones, orientations: np.ndarray, stamp: Ti
             FrameTransform(
                 timestamp=stamp, parent_frame_id=parent, child_frame_id=child,
                 translation=Vector3(x=at[0], y=at[1], z=at[2]),
-                rotation=Quaternion(x=turn[0], y=turn[1], z=turn[2], w=turn[3]),
+                rotation=Quaternion(w=turn[0], x=turn[1], y=turn[2], z=turn[3]),
             )
             for parent, child, at, turn in rows
         ]

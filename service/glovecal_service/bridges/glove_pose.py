@@ -13,7 +13,8 @@ from glovecal_client.wire.pose import Pose, RotationFlag
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HandBones
 from glovecal_models.hand.rotations import Handedness, completed, known_hand
-from glovecal_models.hand.skeleton import Skeleton, skeleton_from_document
+from glovecal_models.hand.skeleton import Quaternion, Skeleton, skeleton_from_document
+from glovecal_service.bridges.bone_turns import BoneTurns
 
 PoseState = Literal["live", "stale", "uncalibrated"]
 NO_HAND = (
@@ -85,19 +86,26 @@ class BonesInMotion:
     def __init__(self) -> None:
         self._last: dict[str, float] = {}
         self._model: str | None = None
-        self._bones: HandBones | None = None
+        self._turns: BoneTurns | None = None
 
-    def orientations(self, hand: GlovePose) -> tuple[HandBones, np.ndarray] | None:
-        """The bones and their orientations (B, 3, 3) in the forearm's frame; None where it is not known which
-        hand the glove is on."""
+    def turned(self, hand: GlovePose) -> tuple[HandBones, list[Quaternion]] | None:
+        """The bones, and how each is turned in its parent's frame; None where it is not known which hand the
+        glove is on."""
         skeleton = hand.meaning.skeleton
         if skeleton is None:
             return None
-        if self._bones is None or self._bones.skeleton is not skeleton:
-            self._bones = HandBones.of(skeleton)
+        if self._turns is None or self._turns.bones.skeleton is not skeleton:
+            self._turns = BoneTurns(HandBones.of(skeleton))
         if hand.pose.model_sha256 != self._model:
             self._last, self._model = {}, hand.pose.model_sha256
         usable = zip(hand.meaning.rotations, hand.pose.degrees.tolist(), hand.usable.tolist(), strict=True)
         self._last |= {name: degrees for name, degrees, is_usable in usable if is_usable}
-        angles_deg = completed(list(self._last), np.array([list(self._last.values())]), skeleton.rotations)
-        return self._bones, self._bones.orientations(angles_deg)[0]
+        return self._turns.bones, self._turns.local(self._degrees(skeleton))
+
+    def _degrees(self, skeleton: Skeleton) -> list[float]:
+        """In the order of the skeleton's rotations."""
+        try:
+            return [self._last[name] for name in skeleton.rotations]
+        except KeyError:
+            known = np.array([list(self._last.values())])
+            return completed(list(self._last), known, skeleton.rotations)[0].tolist()

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import zenoh
 
@@ -46,6 +46,8 @@ class Ros2Bridge(Bridge):
     """Publishes to the nodes of a ROS 2 whose middleware is rmw_zenoh."""
 
     about = "ROS 2 (Jazzy and later) with rmw_zenoh: sensor_msgs/JointState"
+    to_set_there = "`RMW_IMPLEMENTATION=rmw_zenoh_cpp`; topics `/glovecal/GLOVE/joint_states`"
+    units = "radians, stamps of the capture computer's wall clock"
     when_stale = "nothing is sent"
     options: ClassVar[dict[str, str]] = {
         "to": f"HOST:PORT of the ROS 2 router (rmw_zenohd); default {DEFAULT_ROUTER}",
@@ -68,7 +70,7 @@ class Ros2Bridge(Bridge):
     @property
     def receivers(self) -> int:
         """Topics that somebody listens to."""
-        return sum(topic.publisher.matching_status.matching for topic in list(self._topics.values()))
+        return sum(topic.is_listened_to for topic in list(self._topics.values()))
 
     def send(self, hand: GlovePose) -> None:
         if hand.state != "live" or self._session is None:
@@ -125,6 +127,11 @@ class _Topic:
         )
         gid = hashlib.blake2b(token.encode(), digest_size=16).digest()
         return cls(publisher, session.liveliness().declare_token(token), gid)
+
+    @property
+    def is_listened_to(self) -> bool:
+        status: Any = self.publisher.matching_status  # no bool, whatever its stub says
+        return status.matching
 
     def put(self, message: bytes) -> None:
         self.sequence += 1

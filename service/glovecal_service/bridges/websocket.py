@@ -44,6 +44,11 @@ class WebSocketBridge(Bridge):
     """Serves browsers, and any program that reads JSON from a WebSocket."""
 
     about = "web pages and scripts: JSON, or the wire's own binary poses"
+    to_set_there = (
+        "the address; a page that another computer serves needs `--option origin=ORIGIN`; "
+        "[an example](#a-page-of-your-own)"
+    )
+    units = "degrees; the skeleton in mm, right-handed, x to the fingers, z out of the back of the hand"
     when_stale = "the last pose, with state stale"
     options: ClassVar[dict[str, str]] = {
         "port": f"to listen on; default {DEFAULT_PORT}",
@@ -154,6 +159,7 @@ class _Messages:
     def text(self) -> str:
         hand, pose = self.hand, self.hand.pose
         names = hand.meaning.rotations
+        degrees, sd_deg = (part.astype(float).round(5).tolist() for part in (pose.degrees, pose.deviations))
         document = {
             "type": "pose",
             "glove": hand.glove,
@@ -163,8 +169,8 @@ class _Messages:
             "time_s": pose.monotonic_ns / 1e9,
             "wall_time_s": pose.wall_ns / 1e9,
             "age_ms": pose.age_us / 1e3,
-            "degrees": dict(zip(names, pose.degrees.tolist(), strict=True)),
-            "sd_deg": dict(zip(names, pose.deviations.tolist(), strict=True)),
+            "degrees": dict(zip(names, degrees, strict=True)),
+            "sd_deg": dict(zip(names, sd_deg, strict=True)),
             "unusable": [name for name, is_usable in zip(names, hand.usable, strict=True) if not is_usable],
         }
         return json.dumps(document)

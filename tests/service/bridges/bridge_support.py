@@ -35,7 +35,8 @@ class WornHand:
     """A glove that publishes whole poses, as the service does for a calibrated one."""
 
     def __init__(self, session: zenoh.Session, glove: str, hand: Handedness) -> None:
-        self.glove, self.hand = glove, hand
+        self.glove = glove
+        self.hand: Handedness = hand
         self.keys = GloveKeys(SITE, glove)
         self.skeleton = hand_skeleton(SIZES, hand)
         self.rotations = HAND_ROTATIONS
@@ -182,12 +183,24 @@ class RunningBridge:
 
 
 @contextmanager
-def running_bridge(stage: Stage, name: str, *options: object) -> Iterator[RunningBridge]:
-    """Until the block ends; it must end cleanly."""
-    process = start({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", name, "--json", *options)
+def running_bridge(service: Stage | str, name: str, *options: object) -> Iterator[RunningBridge]:
+    """Until the block ends; it must end cleanly. ``service``: a stage, or the endpoint of a router."""
+    endpoint = service if isinstance(service, str) else service.endpoint
+    process = start({"GLOVECAL_ZENOH": endpoint}, "bridge", name, "--json", *options)
     bridge = RunningBridge(process)
     try:
         yield bridge
     finally:
         if process.returncode is None:
             bridge.end()
+
+
+def refused(stage: Stage, *arguments: object) -> str:
+    """What ``glovecal bridge`` says that refuses ``arguments``, in one line."""
+    process = start({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", *arguments)
+    try:
+        _, complaints = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert process.returncode == 1, complaints
+    return " ".join(complaints.split())

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bridge_support import FIST, FLAT, Stage, WornHand, running_bridge
-from cli_running import glovecal
+from bridge_support import FIST, FLAT, Stage, WornHand, refused, running_bridge
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from realtime_support import eventually
 from scipy.spatial.transform import Rotation
@@ -130,5 +129,5 @@ def test_frames_joints_and_state_of_both_hands(stage: Stage) -> None:
 def test_a_port_in_use_is_told(stage: Stage) -> None:
     with running_bridge(stage, "foxglove", "--port", 0) as bridge:
         _, port = bridge.place()
-        said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "foxglove", "--port", port).said
+        said = refused(stage, "foxglove", "--port", port)
     assert f"cannot listen on 127.0.0.1:{port}, it is in use or not this computer's" in said

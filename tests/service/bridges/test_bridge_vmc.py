@@ -1,0 +1,139 @@
+"""The VMC bridge, parsed by python-osc: names, signs of both hands, and where an avatar's fingers point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from bridge_support import FIST, FLAT, Stage, WornHand, refused, running_bridge
+from datagram_reader import datagrams
+from pythonosc.osc_bundle import OscBundle
+from realtime_support import eventually
+from scipy.spatial.transform import Rotation
+
+from glovecal_client.wire.pose import RotationFlag
+from glovecal_models.hand.bones import PHALANGES, HandBones
+from glovecal_models.hand.rotations import HAND_ROTATIONS, Handedness
+
+CHAINS = {
+    finger: tuple(f"{name}{part}" for part in ("Proximal", "Intermediate", "Distal"))
+    for finger, name in zip(PHALANGES, ("Thumb", "Index", "Middle", "Ring", "Little"), strict=True)
+}
+TO_UNITY = {"right": lambda p: np.array([p[0], p[2], p[1]]), "left": lambda p: np.array([-p[0], p[2], -p[1]])}
+
+
+def read(datagram: bytes) -> dict[str, Any]:
+    """Rotations by bone, and arguments by address."""
+    found: dict[str, Any] = {"bones": {}}
+    for message in OscBundle(datagram):
+        name, *values = message.params
+        if message.address == "/VMC/Ext/Bone/Pos":
+            assert values[:3] == [0.0, 0.0, 0.0]
+            found["bones"][name] = Rotation.from_quat(values[3:])
+        else:
+            found[message.address] = message.params
+    return found
+
+
+def hand_of(
+    receive: Callable[[], bytes], hand: Handedness, is_wanted: Callable[[dict[str, Any]], bool]
+) -> Any:
+    def wanted() -> dict[str, Any] | None:
+        found = read(receive())
+        is_this = any(name.startswith(hand.capitalize()) for name in found["bones"])
+        return found if is_this and is_wanted(found) else None
+
+    return eventually(wanted, f"the {hand} hand")
+
+
+SIGNS: list[tuple[Handedness, str, str, list[int]]] = [
+    ("right", "I_PIP", "IndexIntermediate", [0, 0, -1]),
+    ("left", "I_PIP", "IndexIntermediate", [0, 0, 1]),
+    ("right", "P_MCP", "LittleProximal", [0, 0, -1]),
+    ("left", "R_DIP", "RingDistal", [0, 0, 1]),
+    ("right", "IM_ABD", "IndexProximal", [0, -1, 0]),
+    ("left", "IM_ABD", "IndexProximal", [0, 1, 0]),
+    ("right", "MR_ABD", "RingProximal", [0, 1, 0]),
+    ("right", "T_IP", "ThumbDistal", [0, 1, 0]),
+    ("left", "T_IP", "ThumbDistal", [0, -1, 0]),
+    ("right", "T_MCP", "ThumbIntermediate", [0, 1, 0]),
+    ("left", "T_MCP", "ThumbIntermediate", [0, -1, 0]),
+]
+
+
+def test_each_rotation_turns_its_bone_the_way_unity_wants(stage: Stage) -> None:
+    with datagrams() as (address, receive), running_bridge(stage, "vmc", "--to", address):
+        for hand, rotation, bone, axis in SIGNS:
+            stage.show(**{hand: {"angles": {rotation: 30.0}}})
+            name = f"{hand.capitalize()}{bone}"
+            expected = np.radians(30.0) * np.array(axis)
+
+            def is_turned(found: dict[str, Any], name: str = name, expected: np.ndarray = expected) -> bool:
+                return np.allclose(found["bones"][name].as_rotvec(), expected, atol=1e-6)
+
+            found = hand_of(receive, hand, is_turned)
+            assert len(found["bones"]) == 15
+            straight = [each for each in found["bones"] if "Thumb" not in each and each != name]
+            followers = (
+                {"RightRingProximal": ["RightLittleProximal"]}.get(name, []) if rotation == "MR_ABD" else []
+            )
+            for other in set(straight) - set(followers):
+                assert found["bones"][other].magnitude() < 1e-6, (rotation, other)
+
+
+def pointing(bones: dict[str, Rotation], hand: Handedness, finger: str) -> list[np.ndarray]:
+    """Directions of an avatar's finger bones in Unity, its hand in T-pose."""
+    side = 1.0 if hand == "right" else -1.0
+    rest = np.array([side, 0.0, 1.0]) / np.sqrt(2.0) if finger == "thumb" else np.array([side, 0.0, 0.0])
+    found, carrier = [], Rotation.identity()
+    for part in CHAINS[finger]:
+        carrier = carrier * bones[f"{hand.capitalize()}{part}"]
+        found.append(carrier.apply(rest))
+    return found
+
+
+def require_directions(found: dict[str, Any], worn: WornHand, angles: dict[str, float]) -> None:
+    bones = HandBones.of(worn.skeleton)
+    turned = bones.orientations(np.array([[{**FLAT, **angles}[name] for name in HAND_ROTATIONS]]))[0]
+    in_hand = turned[0].T @ turned
+    for finger, parts in PHALANGES.items():
+        for part, direction in zip(parts, pointing(found["bones"], worn.hand, finger), strict=True):
+            ours = TO_UNITY[worn.hand](in_hand[bones.names.index(f"{finger}_{part}")][:, 0])
+            assert np.degrees(np.linalg.norm(direction - ours)) < 1e-4, (finger, part)
+
+
+def test_an_avatars_fingers_point_where_the_hands_do(stage: Stage) -> None:
+    left = {"T_TMC": 30.0, "TI_ABD": 40.0, "IM_ABD": 20.0, "R_MCP": 50.0, "MR_ABD": 10.0, "W_FLEX": 25.0}
+    stage.show(right={"angles": FIST}, left={"angles": left})
+    with datagrams() as (address, receive), running_bridge(stage, "vmc", "--to", address):
+        require_directions(hand_of(receive, "right", lambda _: True), stage.right, FIST)
+        require_directions(hand_of(receive, "left", lambda _: True), stage.left, left)
+        both = hand_of(receive, "right", lambda each: each["/VMC/Ext/OK"][-1] == 1)
+        assert both["/VMC/Ext/OK"] == [1, 3, 0, 1]
+
+
+def test_uncertain_fingers_keep_still_and_stale_hands_send_no_bones(stage: Stage) -> None:
+    stage.show(right={"angles": FIST})
+    with datagrams() as (address, receive), running_bridge(stage, "vmc", "--to", address) as bridge:
+        hand_of(receive, "right", lambda each: each["/VMC/Ext/OK"][-1] == 1)
+        unsure = {"I_PIP": int(RotationFlag.TOO_UNCERTAIN)}
+        stage.show(right={"angles": {**FIST, "I_PIP": 10.0, "M_PIP": 5.0}, "rotation_flags": unsure})
+        found = hand_of(receive, "right", lambda each: each["/VMC/Ext/OK"][-1] == 0)
+        require_directions(found, stage.right, {**FIST, "M_PIP": 5.0})
+        stage.show(right=None)
+        silent = eventually(lambda: each if not (each := read(receive()))["bones"] else None, "no bones")
+        assert silent["/VMC/Ext/OK"] == [1, 3, 0, 0]
+        summary = bridge.end()
+    assert summary["gloves"]["right"]["slow_receiver"] == 0
+
+
+def test_an_address_that_is_none_is_refused(stage: Stage) -> None:
+    for wrong, sentence in (
+        ("39540", "--to '39540' is no address; give HOST:PORT, as in 127.0.0.1:39540"),
+        ("no.such.host.invalid:39540", "no computer 'no.such.host.invalid' is known here"),
+    ):
+        said = refused(stage, "vmc", "--to", wrong)
+        assert sentence in said
+    said = refused(stage, "vmc", "--port", "1")
+    assert "bridge vmc has no option 'port'; there are to" in said
