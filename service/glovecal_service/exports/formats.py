@@ -16,7 +16,8 @@ from glovecal_service.exports.marker_tables import CSV, PARQUET, TRC
 from glovecal_service.exports.mcap import FORMAT as MCAP
 from glovecal_service.exports.usd import FORMAT as USD
 
-FORMATS: dict[str, ExportFormat] = {one.suffix: one for one in (TRC, BVH, GLTF, FBX, USD, C3D, MCAP, CSV, PARQUET)}
+KINDS = (TRC, BVH, GLTF, FBX, USD, C3D, MCAP, CSV, PARQUET)
+FORMATS: dict[str, ExportFormat] = {one.suffix: one for one in KINDS}
 
 
 def require_possible(chosen: ExportFormat, content: Content) -> None:

@@ -107,11 +107,12 @@ def at_times(motion: HandMotion, at: np.ndarray) -> HandMotion:
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(at), int)
     before = np.maximum(after - 1, 0)
     nearest = np.where(np.abs(at - time[before]) <= np.abs(time[after] - at), before, after)
+    exact = np.where(np.abs(at - time[nearest]) <= SAME_S, time[nearest], at)
     gap = time[after] - time[before] > BRIDGED_S
     gap &= np.minimum(np.abs(at - time[before]), np.abs(time[after] - at)) > SAME_S
 
     def between(values: np.ndarray) -> np.ndarray:
-        found = [np.interp(at, time, column) for column in values.T]
+        found = [np.interp(exact, time, column) for column in values.T]
         columns = np.column_stack(found) if found else np.empty((len(at), 0))
         columns[gap] = np.nan
         return columns

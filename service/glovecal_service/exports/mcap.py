@@ -1,4 +1,4 @@
-"""MCAP, the recording of robotics: joint states as ROS 2 sends them, for Foxglove and ros2 bag (extra ``mcap``).
+"""MCAP, the recording of robotics: joint states as ROS 2 sends them (extra ``mcap``).
 
 One topic a hand with ``sensor_msgs/msg/JointState``, as the live bridge sends it, and one with the same
 message whose positions are standard deviations. Radians; an angle that is not known is left out.

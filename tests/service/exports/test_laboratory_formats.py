@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import c3d
 import numpy as np
 import pytest
-from rosbags.rosbag2 import Reader
+from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_typestore
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -26,7 +27,8 @@ def test_c3d_holds_every_joint_of_both_hands(tmp_path: Path) -> None:
     gappy = replace(hands[0], degrees=hands[0].degrees.copy())
     gappy.degrees[3] = np.nan
     FORMATS[".c3d"].write([gappy, hands[1]], "joints", tmp_path / "both.c3d")
-    with (tmp_path / "both.c3d").open("rb") as stream:
+    with (tmp_path / "both.c3d").open("rb") as stream, warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of no analogue data
         read = c3d.Reader(stream)
         names = [label.strip() for label in read.point_labels]
         frames = [points for _, points, _ in read.read_frames()]
@@ -48,18 +50,20 @@ def test_mcap_holds_the_angles_their_deviations_and_times(tmp_path: Path) -> Non
     FORMATS[".mcap"].write(hands, "angles", tmp_path / "both.mcap")
     types = get_typestore(Stores.ROS2_JAZZY)
     found: dict[str, list] = {}
-    with Reader(tmp_path) as reader:
-        for connection, time_ns, raw in reader.messages():
-            assert connection.msgtype == "sensor_msgs/msg/JointState"
-            message = types.deserialize_cdr(raw, connection.msgtype)
-            found.setdefault(connection.topic, []).append((time_ns, message))
-    assert set(found) == {f"/glovecal/{side}/{topic}" for side in ("left", "right") for topic in ("joint_states", "deviations")}
+    with (tmp_path / "both.mcap").open("rb") as stream:
+        for schema, channel, one in make_reader(stream).iter_messages():
+            assert schema is not None
+            assert (schema.name, schema.encoding) == ("sensor_msgs/msg/JointState", "ros2msg")
+            message = types.deserialize_cdr(one.data, schema.name)
+            found.setdefault(channel.topic, []).append((one.log_time, message))
+    topics = ("joint_states", "deviations")
+    assert set(found) == {f"/glovecal/{side}/{topic}" for side in ("left", "right") for topic in topics}
     for hand, side in zip(hands, ("right", "left"), strict=True):
         times, messages = zip(*found[f"/glovecal/{side}/joint_states"], strict=True)
         np.testing.assert_array_equal(times, np.round((hand.time_s - hand.time_s[0]) * 1e9))
         for frame, message in enumerate(messages):
             known = np.isfinite(hand.degrees[frame])
-            assert list(message.name) == [name for name, is_known in zip(hand.rotations, known, strict=True) if is_known]
+            assert list(message.name) == [name for at, name in enumerate(hand.rotations) if known[at]]
             np.testing.assert_allclose(np.degrees(message.position), hand.degrees[frame][known], atol=1e-9)
         deviations = found[f"/glovecal/{side}/deviations"][0][1]
         np.testing.assert_allclose(np.degrees(deviations.position), hand.sd_deg[0], atol=1e-9)
@@ -67,7 +71,7 @@ def test_mcap_holds_the_angles_their_deviations_and_times(tmp_path: Path) -> Non
 
 def test_what_is_not_installed_is_said_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("glovecal_service.exports.formats.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r"a \\.c3d file needs ezc3d, which is not installed"):
+    with pytest.raises(BadInput, match=r"a \.c3d file needs ezc3d, which is not installed"):
         require_possible(FORMATS[".c3d"], "joints")
 
 
