@@ -12,7 +12,7 @@ hand's length.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -211,11 +211,7 @@ class _Hand:
 
     @classmethod
     def moving(cls, motion: HandMotion) -> _Hand:
-        degrees = _held(motion.degrees)
-        if motion.wrist == "optical":
-            degrees[:, [name in WRIST for name in motion.rotations]] = 0.0
-        whole = completed(motion.rotations, degrees, motion.skeleton.rotations)
-        return cls(motion.label, HandBones.of(motion.skeleton), whole)
+        return cls(motion.label, HandBones.of(motion.skeleton), whole_angles(motion))
 
     @classmethod
     def at_rest(cls, other: Skeleton, label: str) -> _Hand:
@@ -255,13 +251,15 @@ class _Hand:
         return against
 
 
-def continuous_quaternions(body: BodyMotion) -> Iterator[tuple[slice, np.ndarray]]:
-    """Frames of a block, and (n, B, 4) the turns as x, y, z, w; of a turn's two quaternions the one nearer to
-    that of the frame before, so that what stands between two key frames is between them."""
+def continuous_quaternions(
+    blocks_of_turns: Iterable[tuple[slice, np.ndarray]],
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """Frames of a block, and (n, B, 4) its turns (n, B, 3, 3) as x, y, z, w; of a turn's two quaternions the
+    one nearer to that of the frame before, so that what stands between two key frames is between them."""
     from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
 
     last = None
-    for which, turns in body.turns():
+    for which, turns in blocks_of_turns:
         quaternions = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat()
         quaternions = quaternions.reshape(*turns.shape[:2], 4)
         before = np.concatenate([quaternions[:1] if last is None else last, quaternions[:-1]])
@@ -294,6 +292,15 @@ def even_steps(time_s: np.ndarray, digits: int) -> tuple[np.ndarray, float]:
         raise BadInput(f"{count} frames on even steps are too many; at most {MOST_FRAMES}")
     step = round(lasts / (count - 1), digits)
     return np.minimum(time_s[0] + step * np.arange(count), time_s[-1]), step
+
+
+def whole_angles(motion: HandMotion) -> np.ndarray:
+    """(N, R) in the order of the skeleton's rotations, finite: an angle that is not known stays as it last
+    was; what was never known follows a rule, or rests."""
+    degrees = _held(motion.degrees)
+    if motion.wrist == "optical":
+        degrees[:, [name in WRIST for name in motion.rotations]] = 0.0
+    return completed(motion.rotations, degrees, motion.skeleton.rotations)
 
 
 def _held(degrees: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -41,7 +41,7 @@ def write_gltf(motions: Sequence[HandMotion], content: Content, path: Path) -> N
     """Hands on one time, on one body. Raises BadInput for raw readings."""
     body = BodyMotion.of(motions, content, FORMAT.suffix)
     bones = with_ends(body.bones)
-    numbers = _Numbers()
+    numbers = BinaryNumbers()
     mesh = _mesh(bones, numbers)
     count = len(body.time_s)
     time_s = body.time_s - body.time_s[0]
@@ -81,18 +81,24 @@ def write_gltf(motions: Sequence[HandMotion], content: Content, path: Path) -> N
         "bufferViews": numbers.views,
         "buffers": [{"byteLength": numbers.length}],
     }
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
     with path.open("wb") as stream:
-        stream.write(struct.pack("<III", MAGIC, VERSION, 12 + 8 + len(text) + 8 + numbers.length))
-        stream.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
-        stream.write(struct.pack("<II", numbers.length, BINARY_CHUNK))
-        begin = stream.tell()
-        stream.truncate(begin + numbers.length)
-        numbers.write(stream, begin)
-        for which, quaternions in continuous_quaternions(body):
+        begin = write_container(stream, document, numbers)
+        for which, quaternions in continuous_quaternions(body.turns()):
             for bone, accessor in enumerate(turns):
                 numbers.write_at(stream, begin, accessor, which.start, quaternions[:, bone])
+
+
+def write_container(stream: BinaryIO, document: Mapping[str, Any], numbers: BinaryNumbers) -> int:
+    """JSON and the room for the binary block, with all that is known already; where the block begins."""
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    stream.write(struct.pack("<III", MAGIC, VERSION, 12 + 8 + len(text) + 8 + numbers.length))
+    stream.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
+    stream.write(struct.pack("<II", numbers.length, BINARY_CHUNK))
+    begin = stream.tell()
+    stream.truncate(begin + numbers.length)
+    numbers.write(stream, begin)
+    return begin
 
 
 def _node(bone: Bone, bones: Sequence[Bone]) -> dict[str, Any]:
@@ -108,7 +114,7 @@ def _inverse_binds(bones: Sequence[Bone]) -> np.ndarray:
     return matrices.swapaxes(1, 2).reshape(-1, 16)
 
 
-def _mesh(bones: Sequence[Bone], numbers: _Numbers) -> dict[str, Any]:
+def _mesh(bones: Sequence[Bone], numbers: BinaryNumbers) -> dict[str, Any]:
     places, faces, carriers = drawn_bones(bones)
     positions, joints = (places / MM_PER_UNIT).astype("<f4"), np.zeros((len(places), 4))
     joints[:, 0] = carriers
@@ -123,8 +129,8 @@ def _mesh(bones: Sequence[Bone], numbers: _Numbers) -> dict[str, Any]:
 
 
 @dataclass
-class _Numbers:
-    """What stands in the binary block, where."""
+class BinaryNumbers:
+    """What stands in the binary block, where; of a file that is added to, what is there comes first."""
 
     accessors: list[dict[str, Any]] = field(default_factory=list)
     views: list[dict[str, Any]] = field(default_factory=list)
@@ -159,14 +165,17 @@ class _Numbers:
     def write(self, stream: BinaryIO, begin: int) -> None:
         """All that is known already, into the block that starts at ``begin``."""
         for number, content in self.known.items():
-            stream.seek(begin + self.views[number]["byteOffset"])
+            stream.seek(begin + self._offset(number))
             stream.write(content)
 
     def write_at(self, stream: BinaryIO, begin: int, number: int, first: int, values: np.ndarray) -> None:
         """The elements of an accessor from ``first`` on."""
         content = np.ascontiguousarray(values, _TYPES[self.accessors[number]["componentType"]])
-        stream.seek(begin + self.views[number]["byteOffset"] + first * content[0].nbytes)
+        stream.seek(begin + self._offset(number) + first * content[0].nbytes)
         stream.write(content.tobytes())
+
+    def _offset(self, number: int) -> int:
+        return self.views[self.accessors[number]["bufferView"]]["byteOffset"]
 
 
 FORMAT = ExportFormat(

@@ -22,6 +22,8 @@ from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
+from glovecal_service.exports.character import Character
+from glovecal_service.exports.character_fit import CharacterFit
 from glovecal_service.exports.formats import format_of, require_possible
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
 from glovecal_service.exports.resampling import Resampling
@@ -130,6 +132,8 @@ class MotionFile:
     wrist: Wrist
     body: Body | None
     resampling: Resampling
+    character: Path | None = None
+    """A file whose skeleton is to move, instead of the body's."""
 
     def __post_init__(self) -> None:
         labels = [hand.label for hand in self.hands]
@@ -141,6 +145,8 @@ class MotionFile:
         require_possible(format_of(self.path.name), self.content)
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
+        if self.character is not None and self.path.suffix != ".glb":
+            raise BadInput(f"a character moves in a .glb file, not in {self.path.suffix}")
         if self.frames > MOST_FRAMES:
             raise BadInput(f"{self.frames} frames are too many for one file; export at most {MOST_FRAMES}")
 
@@ -155,6 +161,22 @@ class MotionFile:
 
 def write_motion(asked: MotionFile) -> None:
     """Raises BadInput, LayoutMismatch, DamagedArtifact."""
+    hands = hands_in_motion(asked)
+    if asked.character is not None:
+        Character.read(asked.character, "the character's file").write(hands, asked.content, asked.path)
+    else:
+        format_of(asked.path.name).write(hands, asked.content, asked.path)
+
+
+def fits(asked: MotionFile) -> list[CharacterFit]:
+    """How well the character shows each hand. Raises as ``write_motion``."""
+    assert asked.character is not None
+    character = Character.read(asked.character, "the character's file")
+    return [CharacterFit.of(motion, character) for motion in hands_in_motion(asked)]
+
+
+def hands_in_motion(asked: MotionFile) -> list[HandMotion]:
+    """On one time, resampled as asked."""
     motions = [hand.motion() for hand in asked.hands]
     if len(motions) > 1 and not asked.shifts_s:
         clocks = [TakeClock.of_accounting(hand.accounting) for hand in asked.hands]
@@ -166,7 +188,7 @@ def write_motion(asked: MotionFile) -> None:
         hands = [replace(one, wrist="optical") for one in hands]
     if asked.body is not None:
         hands = _with_body(asked, asked.body, hands)
-    format_of(asked.path.name).write(asked.resampling.of(hands), asked.content, asked.path)
+    return asked.resampling.of(hands)
 
 
 def _with_body(asked: MotionFile, body: Body, hands: Sequence[HandMotion]) -> list[HandMotion]:

@@ -116,7 +116,7 @@ def write_usd(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         turn = "({:.9g}, {:.9g}, {:.9g}, {:.9g})"
         turn = "({:.9g}, {:.9g}, {:.9g}, {:.9g})"
         line = f"                {{!r}}: [{', '.join([turn] * len(moving))}],\n"
-        for which, quaternions in continuous_quaternions(body):
+        for which, quaternions in continuous_quaternions(body.turns()):
             rows = np.roll(quaternions, 1, axis=2).reshape(len(quaternions), -1).tolist()
             stream.writelines(
                 line.format(code, *row) for code, row in zip(codes[which].tolist(), rows, strict=True)

@@ -59,7 +59,8 @@ def read_glb(path: Path, time_s: float) -> Places:
     def go(number: int, place: np.ndarray, axes: np.ndarray) -> None:
         node = document.nodes[number]
         place = place + axes @ np.array(node.translation or [0, 0, 0])
-        axes = axes @ turned.get(number, np.eye(3))
+        rest = Rotation.from_quat(node.rotation or [0, 0, 0, 1]).as_matrix()
+        axes = axes @ turned.get(number, rest)
         found[node.name] = 1000 * place
         for child in node.children or []:
             go(child, place, axes)
@@ -166,7 +167,7 @@ def test_between_frames_no_bone_turns_the_long_way_round(tmp_path: Path) -> None
     degrees = np.tile(np.linspace(-400.0, 400.0, 200)[:, None], (1, len(hand.rotations)))
     turning = replace(hand, degrees=degrees)
     body = BodyMotion.of([turning], "joints", ".glb")
-    steps = [quaternions for _, quaternions in continuous_quaternions(body)]
+    steps = [quaternions for _, quaternions in continuous_quaternions(body.turns())]
     assert (np.einsum("nbi,nbi->nb", steps[0][1:], steps[0][:-1]) > 0).all()
     FORMATS[".fbx"].write([turning], "joints", tmp_path / "turning.fbx")
     fine = replace(turning, degrees=(degrees[:-1] + degrees[1:]) / 2)

@@ -28,7 +28,7 @@ _FLEX, _SPREAD = 1, 2
 
 
 @dataclass(frozen=True)
-class _Chain:
+class Chain:
     """One finger of the rig."""
 
     bones: tuple[int, ...]
@@ -50,10 +50,10 @@ class Touches:
         bones = self.retargeting.bones
         segments, places = bones.posed(angles_deg)
         turned = self.retargeting.carried(segments)
-        if "thumb" not in self._chains or len(self._chains) < 2:
+        if "thumb" not in self.chains or len(self.chains) < 2:
             return turned
-        tips = places[:, [bones.names.index(f"{finger}_distal") for finger in self._chains], 1]
-        thumb = list(self._chains).index("thumb")
+        tips = places[:, [bones.names.index(f"{finger}_distal") for finger in self.chains], 1]
+        thumb = list(self.chains).index("thumb")
         gaps = np.delete(tips - tips[:, [thumb]], thumb, axis=1)
         distance = np.linalg.norm(gaps, axis=2)
         weights = np.clip((FAR_MM - distance) / (FAR_MM - NEAR_MM), 0.0, 1.0)
@@ -65,8 +65,17 @@ class Touches:
 
     def tips(self, orientations: np.ndarray) -> dict[str, np.ndarray]:
         """(N, 3) by finger: the rig's fingertips from the head of its hand bone, in its world and unit."""
-        places = self._joints(orientations)[:, :, -1]
-        return {finger: places[:, number] for number, finger in enumerate(self._chains)}
+        places = self.joints(orientations)[:, :, -1]
+        return {finger: places[:, number] for number, finger in enumerate(self.chains)}
+
+    def own_joints_mm(self, angles_deg: np.ndarray) -> np.ndarray:
+        """(N, F, K + 1, 3) as ``joints``, of the hand itself, from its wrist, in the rig's world, mm."""
+        bones = self.retargeting.bones
+        places = bones.posed(angles_deg)[1] @ self.retargeting.palm.T
+        numbers = np.array(
+            [[bones.names.index(f"{finger}_{part}") for part in PHALANGES[finger]] for finger in self.chains]
+        )
+        return np.concatenate([places[:, numbers, 0], places[:, numbers[:, -1:], 1]], axis=2)
 
     def own_tips_mm(self, angles_deg: np.ndarray) -> dict[str, np.ndarray]:
         """(N, 3) by finger: the hand's fingertips from its wrist, in the rig's world."""
@@ -76,7 +85,7 @@ class Touches:
         return {finger: places[:, last, 1] @ self.retargeting.palm.T for finger, last in lasts.items()}
 
     @cached_property
-    def _chains(self) -> dict[str, _Chain]:
+    def chains(self) -> dict[str, Chain]:
         """Fingers whose bones all turn."""
         made = self.retargeting
         mapping, rig = made.mapping, made.rig
@@ -100,7 +109,7 @@ class Touches:
             ]
             base = wrist.orientation.T @ (heads[0] - np.array(wrist.head))
             numbers = tuple(made.names.index(bone.name) for bone in bones)
-            chains[finger] = _Chain(numbers, base, np.array(offsets))
+            chains[finger] = Chain(numbers, base, np.array(offsets))
         return chains
 
     @cached_property
@@ -108,7 +117,7 @@ class Touches:
         """Units of the rig for a millimetre of the hand: by the lengths of their fingers, knuckle to tip."""
         bones = self.retargeting.bones
         own = other = 0.0
-        for finger, chain in self._chains.items():
+        for finger, chain in self.chains.items():
             numbers = [bones.names.index(f"{finger}_{part}") for part in PHALANGES[finger]]
             own += float(np.linalg.norm(bones.tails_mm[numbers], axis=1).sum())
             other += float(np.linalg.norm(chain.offsets, axis=1).sum())
@@ -117,17 +126,17 @@ class Touches:
     @cached_property
     def _numbers(self) -> np.ndarray:
         """(F, K) the bones of the fingers, in the retargeting's names."""
-        return np.array([chain.bones for chain in self._chains.values()])
+        return np.array([chain.bones for chain in self.chains.values()])
 
     @cached_property
     def _bases(self) -> np.ndarray:
-        return np.array([chain.base for chain in self._chains.values()])
+        return np.array([chain.base for chain in self.chains.values()])
 
     @cached_property
     def _offsets(self) -> np.ndarray:
-        return np.array([chain.offsets for chain in self._chains.values()])
+        return np.array([chain.offsets for chain in self.chains.values()])
 
-    def _joints(self, orientations: np.ndarray) -> np.ndarray:
+    def joints(self, orientations: np.ndarray) -> np.ndarray:
         """(N, F, K + 1, 3): joints of each finger and its tip, from the head of the hand bone."""
         made = self.retargeting
         wrist = orientations[:, made.names.index(made.mapping[HAND])]
@@ -139,7 +148,7 @@ class Touches:
         self, orientations: np.ndarray, thumb: int, wanted: np.ndarray, weights: np.ndarray
     ) -> np.ndarray:
         """``wanted`` (n, F - 1, 3) from the thumb's tip to each finger's, ``weights`` (n, F - 1)."""
-        count, fingers = len(orientations), len(self._chains)
+        count, fingers = len(orientations), len(self.chains)
         size = self.units_a_mm * self.retargeting.bones.skeleton.dimensions.hand_length_mm
         others = [number for number in range(fingers) if number != thumb]
         places, axes = np.array(_JOINTS).T
@@ -148,7 +157,7 @@ class Touches:
         fastened = self.retargeting.fastened[self._numbers].swapaxes(-1, -2)
         damped = DAMPING**2 * np.eye(further.shape[1])
         for _ in range(STEPS):
-            joints = self._joints(turned)
+            joints = self.joints(turned)
             gaps = joints[:, others, -1] - joints[:, [thumb], -1]
             aim = gaps + weights[:, :, None] * (wanted - gaps) if aim is None else aim
             segments = turned[:, self._numbers] @ fastened

@@ -11,7 +11,7 @@ from glovecal_models.hand.rotations import Handedness
 from glovecal_service.cli.take.rows import find_take, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id
-from glovecal_service.cli.terminal.printing import Overwrite, require_place, write_whole
+from glovecal_service.cli.terminal.printing import Overwrite, out, require_place, write_whole
 
 MOST_HANDS = 2
 
@@ -31,6 +31,15 @@ def _hands(given: list[str] | None) -> list[str] | None:
 
 def _names(given: str | None) -> list[str]:
     return [name.strip() for name in (given or "").split(",") if name.strip()]
+
+
+def _say_fit(row: dict[str, Any]) -> None:
+    lacks = f"; it lacks {', '.join(row['missing'])}" if row["missing"] else ""
+    touches = f"{row['lost']} of {row['touches']} touches lost" if row["touches"] else "no touches"
+    out.print(
+        f"{row['hand']} hand: {len(row['bones'])} bones found{lacks}. Its fingertips are "
+        f"{row['fingertip_mm']:.1f} mm from the hand's, in the hand's size; {touches}."
+    )
 
 
 def motion(
@@ -84,6 +93,10 @@ def motion(
         str | None, typer.Option(metavar="MARKERS", help="That place the right hand, see docs/two-gloves.md.")
     ] = None,
     left: Annotated[str | None, typer.Option(metavar="MARKERS", help="That place the left hand.")] = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="A character (.glb) whose skeleton is to move."),
+    ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write one hand or both as motion: BVH for animation (on a body at rest), TRC for OpenSim and
@@ -113,4 +126,8 @@ def motion(
         if body is not None:
             markers = {"right": _names(right), "left": _names(left)}
             asked |= {"body": {"upload": service.upload(body), "shift_s": body_shift, **markers}}
+        if onto is not None:
+            asked |= {"onto": service.upload(onto)}
+            for hand_row in service.post("/motion/character", asked):
+                _say_fit(hand_row)
         write_whole({file: service.made("/motion", asked)})

@@ -246,3 +246,18 @@ class MotionFormat(Row):
     times: str
     accuracy: str = Field(description="What it holds of the angles' standard deviations and flags.")
     read_by: str
+
+
+class CharacterHand(Row):
+    """How well a character's hand shows a motion."""
+
+    hand: Handedness
+    bones: dict[str, str] = Field(description="The character's bone by the hand's.")
+    missing: list[str] = Field(description="Bones of the hand that the character lacks.")
+    fingertip_mm: float = Field(
+        description="Root mean square over frames and fingers: how far the character's fingertips are from "
+        "the hand's, both seen from the wrist, in the hand's size."
+    )
+    touches: int = Field(description="Frames, of 500 at most, in which the thumb touches a finger.")
+    lost: int = Field(description="Of these, in which the character's does not.")
+    picture: str = Field(description="SVG: the hand and the character, flat, as a fist, and touching.")

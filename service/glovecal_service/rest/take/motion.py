@@ -19,13 +19,13 @@ from glovecal_service.exports.body_markers import Wrist
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.exports.motion_file import Body as BodyFile
-from glovecal_service.exports.motion_file import HandTake, MotionFile, write_motion
+from glovecal_service.exports.motion_file import HandTake, MotionFile, fits, write_motion
 from glovecal_service.exports.resampling import Resampling
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.problem import change_problems
-from glovecal_service.rest.take.answer import MotionFormat
+from glovecal_service.rest.take.answer import CharacterHand, MotionFormat
 from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/motion", tags=["takes"])
@@ -97,6 +97,11 @@ class Motion(StrictBody):
     body: Body | None = Field(
         None, description="Markers of an optical system, joined to the joints in a TRC."
     )
+    onto: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = Field(
+        None,
+        description="A character (.glb) sent to `uploads`: its skeleton moves, found by the names of its "
+        "bones; format glb.",
+    )
 
 
 @router.get("", summary="Formats of motion files")
@@ -157,6 +162,24 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
     )
 
 
+@router.post("/character", summary="How well a character shows a motion", responses=change_problems(409))
+async def look_at_character(body: Motion, request: Request, parts: PartsNeeded) -> list[CharacterHand]:
+    """Which of its bones is which of the hand's, how far its fingertips are from the hand's, and which
+    touches are lost, for each hand of a motion that names a character (`onto`)."""
+    if body.onto is None:
+        raise BadInput("no character is named; send a .glb file to /v1/uploads and name it in onto")
+    answer: list[CharacterHand] = []
+
+    def look(cancelled: Cancel) -> None:
+        seen = fits(_asked(parts, body, Path("motion.glb")))
+        answer.extend(
+            CharacterHand.model_validate({**vars(one), "missing": list(one.missing)}) for one in seen
+        )
+
+    await in_time(request, parts, look, limit_s=LIMIT_S, what="this look")
+    return answer
+
+
 def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
     for name, given in (("models", body.models), ("hands", body.hands), ("shifts_s", body.shifts_s)):
         if given and len(given) != len(body.takes):
@@ -171,9 +194,22 @@ def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
         if file is None:
             raise NotFound(f"no upload {body.body.upload[:12]}; send the TRC file to /v1/uploads first")
         markers = BodyFile(file, body.body.shift_s, tuple(body.body.right), tuple(body.body.left))
+    character = None
+    if body.onto is not None:
+        character = parts.uploads.find(body.onto)
+        if character is None:
+            raise NotFound(f"no upload {body.onto[:12]}; send the character's .glb to /v1/uploads first")
     resampling = Resampling(body.rate_hz, body.low_pass_hz)
     return MotionFile(
-        tuple(hands), body.content, path, tuple(body.shifts_s), body.claps, body.wrist, markers, resampling
+        tuple(hands),
+        body.content,
+        path,
+        tuple(body.shifts_s),
+        body.claps,
+        body.wrist,
+        markers,
+        resampling,
+        character,
     )
 
 

@@ -1,0 +1,192 @@
+"""A character of an animation tool, as a binary glTF file (.glb): its skeleton, and a take as its animation.
+
+What is written is the character's own file with one animation more: meshes, materials and names stay.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from glovecal_models.documents import read_json
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.rig import Rig, RigBone
+from glovecal_models.hand.retargeting.touches import Touches
+from glovecal_service.exports.body_motion import SIDES, continuous_quaternions, whole_angles
+from glovecal_service.exports.gltf import (
+    BINARY_CHUNK,
+    FLOAT,
+    JSON_CHUNK,
+    MAGIC,
+    BinaryNumbers,
+    write_container,
+)
+from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
+
+LARGEST_JSON = 64_000_000
+MOST_NODES = 20_000
+DEEPEST = 500
+RIGHT = "is it a binary glTF 2.0 file (.glb)? Export the character again"
+
+
+@dataclass(frozen=True)
+class Character:
+    path: Path
+    document: dict[str, Any]
+    begins: int
+    """Where the binary block begins in the file."""
+    length: int
+
+    @classmethod
+    def read(cls, path: Path, name: str) -> Character:
+        """Raises BadInput that names ``name`` and what is wrong with it."""
+        with path.open("rb") as stream:
+            head = stream.read(20)
+            if len(head) < 20 or struct.unpack("<I", head[:4])[0] != MAGIC:
+                raise BadInput(f"{name} does not begin as glTF does; {RIGHT}")
+            length, kind = struct.unpack("<II", head[12:20])
+            if kind != JSON_CHUNK or length > LARGEST_JSON:
+                raise BadInput(f"{name} has no description of its scene, or one of {length} bytes; {RIGHT}")
+            document = read_json(stream.read(length), name)
+            chunk = stream.read(8)
+        if not isinstance(document, dict):
+            raise BadInput(f"{name} describes no scene; {RIGHT}")
+        size, kind = struct.unpack("<II", chunk) if len(chunk) == 8 else (0, BINARY_CHUNK)
+        begins = 20 + length + 8
+        if kind != BINARY_CHUNK or begins + size > path.stat().st_size:
+            raise BadInput(f"{name} is not whole: its numbers are missing; {RIGHT}")
+        return cls(path, document, begins, size)
+
+    @cached_property
+    def rig(self) -> Rig:
+        """Nodes in the pose that the file gives them. Raises BadInput for nodes that are no tree."""
+        nodes = self.document.get("nodes")
+        if not isinstance(nodes, list) or not 0 < len(nodes) <= MOST_NODES:
+            raise BadInput(f"the character has no nodes, or more than {MOST_NODES}; {RIGHT}")
+        try:
+            return Rig(tuple(self._bones(nodes)))
+        except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+            raise BadInput(f"the character's nodes are not as glTF has them; {RIGHT}") from error
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the nodes, by number; each another."""
+        names: list[str] = []
+        taken: set[str] = set()
+        for number, node in enumerate(self.document["nodes"]):
+            name = str(node.get("name") or f"node {number}")[:200]
+            names.append(f"{name} ({number})" if name in taken else name)
+            taken.add(names[-1])
+        return tuple(names)
+
+    def _bones(self, nodes: Sequence[Any]) -> Iterator[RigBone]:
+        parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", ())}
+        waiting = [(number, 0, np.eye(4)) for number in range(len(nodes)) if number not in parents]
+        seen = 0
+        while waiting:
+            number, depth, above = waiting.pop()
+            seen += 1
+            if depth > DEEPEST or seen > len(nodes):
+                raise ValueError("no tree")
+            own = above @ _matrix(nodes[number])
+            axes = own[:3, :3] / np.linalg.norm(own[:3, :3], axis=0)
+            if not np.isfinite(own).all() or abs(np.linalg.det(axes)) < 0.5:
+                raise ValueError("no turn")
+            parent = parents.get(number)
+            yield RigBone(
+                self.names[number], None if parent is None else self.names[parent], tuple(own[:3, 3]), axes
+            )
+            waiting += [(child, depth + 1, own) for child in nodes[number].get("children", ())]
+
+    def write(self, motions: Sequence[HandMotion], content: Content, path: Path) -> None:
+        """Hands on one time, as an animation more. Raises BadInput where a hand is not found."""
+        document = json.loads(json.dumps(self.document))
+        numbers = BinaryNumbers(
+            document.setdefault("accessors", []), document.setdefault("bufferViews", []),
+            self.length + -self.length % 4,
+        )  # fmt: skip
+        time_s = motions[0].time_s - motions[0].time_s[0]
+        times = numbers.add(FLOAT, "SCALAR", time_s, low=[0.0], high=[float(np.float32(time_s[-1]))])
+        channels, samplers, planned = [], [], []
+        for motion in motions:
+            motion.require_angles(content)
+            touches = Touches(Retargeting.of(motion.skeleton, self.rig))
+            rooms = [numbers.room(FLOAT, "VEC4", len(time_s)) for _ in touches.retargeting.names]
+            for name, room in zip(touches.retargeting.names, rooms, strict=True):
+                number = self.names.index(name)
+                _make_turnable(document["nodes"][number])
+                target = {"node": number, "path": "rotation"}
+                channels.append({"sampler": len(samplers), "target": target})
+                samplers.append({"input": times, "output": room, "interpolation": "LINEAR"})
+            planned.append((touches, whole_angles(motion), rooms))
+        notes: dict[str, Any] = {SIDES[motion.label].lower(): dict(motion.notes) for motion in motions}
+        notes["simulated"] = any(motion.simulated for motion in motions)
+        animation = {"name": "Glovecal take", "channels": channels, "samplers": samplers, "extras": notes}
+        document.setdefault("animations", []).append(animation)
+        buffers = document.setdefault("buffers", [{}])
+        buffers[0]["byteLength"] = numbers.length
+        with path.open("wb") as stream:
+            begin = write_container(stream, document, numbers)
+            stream.seek(begin)
+            with self.path.open("rb") as own:
+                own.seek(self.begins)
+                shutil.copyfileobj(_Part(own, self.length), stream)
+            numbers.write(stream, begin)
+            for touches, angles, rooms in planned:
+                for which, quaternions in continuous_quaternions(_turns(touches, angles)):
+                    for bone, room in enumerate(rooms):
+                        numbers.write_at(stream, begin, room, which.start, quaternions[:, bone])
+
+
+class _Part:
+    """So many bytes of a file, to be copied."""
+
+    def __init__(self, stream: Any, length: int) -> None:
+        self._stream, self._left = stream, length
+
+    def read(self, size: int = -1) -> bytes:
+        content = self._stream.read(self._left if size < 0 else min(size, self._left))
+        self._left -= len(content)
+        return content
+
+
+def _turns(touches: Touches, angles_deg: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    for which in blocks(len(angles_deg)):
+        orientations = touches.orientations(angles_deg[which])
+        yield which, touches.retargeting.against_parents(orientations)
+
+
+def _matrix(node: Any) -> np.ndarray:
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=float).reshape(4, 4).T
+    matrix = np.eye(4)
+    x, y, z, w = (float(part) for part in node.get("rotation", (0, 0, 0, 1)))
+    turned = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix[:3, :3] = turned * np.array(node.get("scale", (1, 1, 1)), dtype=float)
+    matrix[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=float)
+    return matrix
+
+
+def _make_turnable(node: dict[str, Any]) -> None:
+    """A node that is given as a matrix cannot be animated: its place and size are told apart from its turn,
+    which the animation gives."""
+    if "matrix" in node:
+        matrix = _matrix(node)
+        del node["matrix"]
+        node["translation"] = matrix[:3, 3].tolist()
+        node["scale"] = np.linalg.norm(matrix[:3, :3], axis=0).tolist()

@@ -1,0 +1,117 @@
+"""How well a character's hand shows a motion: its bones, its fingertips, and which touches are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.touches import NEAR_MM, Touches
+from glovecal_service.exports.body_motion import whole_angles
+from glovecal_service.exports.character import Character
+from glovecal_service.exports.hand_motion import HandMotion
+
+MOST_FRAMES = 500
+"""Of a motion that are looked at, evenly over it."""
+LOST_MM = 10.0
+"""A touch is lost where the character's fingertips stand further apart than the hand's by this, in the hand's
+size."""
+FIST_DEG = {"MCP": 85.0, "PIP": 100.0, "DIP": 65.0}
+_SIZE, _VIEW = 150, ((0.0, 1.0, 0.25), (-1.0, 0.0, 0.35))
+"""Of one hand's picture, pixels; across and down in terms of the hand's axes."""
+
+
+@dataclass(frozen=True)
+class CharacterFit:
+    """Of one hand."""
+
+    hand: str
+    bones: dict[str, str]
+    """The character's bone by the hand's."""
+    missing: tuple[str, ...]
+    """The hand's bones that the character lacks."""
+    fingertip_mm: float
+    """Root mean square over frames and fingers: from where the hand has its tips, seen from the wrist, in the
+    hand's size."""
+    touches: int
+    """Frames in which the thumb touches a finger."""
+    lost: int
+    """Of these, in which the character's do not."""
+    picture: str
+    """SVG: flat hand, fist, and the closest touch, of the hand and of the character."""
+
+    @classmethod
+    def of(cls, motion: HandMotion, character: Character) -> CharacterFit:
+        """Raises BadInput where no hand is found."""
+        motion.require_angles("angles")
+        touches = Touches(Retargeting.of(motion.skeleton, character.rig))
+        if not touches.chains:
+            raise BadInput("no finger of the character has all its bones; look at which bone is which")
+        step = max(1, len(motion.time_s) // MOST_FRAMES)
+        angles = whole_angles(motion.frames(slice(None, None, step)))
+        own = touches.own_joints_mm(angles)
+        shown = touches.joints(touches.orientations(angles)) / touches.units_a_mm
+        away = np.linalg.norm(own[:, :, -1] - shown[:, :, -1], axis=2)
+        mapping = touches.retargeting.mapping
+        near, lost, closest = _touched(touches, own, shown)
+        return cls(
+            motion.skeleton.hand, mapping,
+            tuple(name for name in touches.retargeting.bones.names if name not in mapping),
+            float(np.sqrt((away**2).mean())), int(near.sum()), int(lost.sum()),
+            _picture(touches, angles[closest]),
+        )  # fmt: skip
+
+
+def _touched(touches: Touches, own: np.ndarray, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """(N,) whether thumb and a finger touch, (N,) whether the character loses it, and the closest frame."""
+    fingers = list(touches.chains)
+    if "thumb" not in fingers or len(fingers) < 2:
+        return np.zeros(len(own), bool), np.zeros(len(own), bool), 0
+    thumb = fingers.index("thumb")
+    gaps, others = (
+        np.linalg.norm(np.delete(each[:, :, -1] - each[:, [thumb], -1], thumb, axis=1), axis=2)
+        for each in (own, shown)
+    )
+    near = gaps < NEAR_MM
+    lost = near & (others > gaps + LOST_MM)
+    return near.any(axis=1), lost.any(axis=1), int(gaps.min(axis=1).argmin())
+
+
+def _picture(touches: Touches, closest: np.ndarray) -> str:
+    """Palm frames: what is drawn does not depend on how the character stands."""
+    rotations = touches.retargeting.bones.skeleton.rotations
+    flat = np.zeros(len(rotations))
+    fist = flat.copy()
+    for at, name in enumerate(rotations):
+        if name[0] != "T":
+            fist[at] = FIST_DEG.get(name.partition("_")[2], 0.0)
+    angles = np.stack([flat, fist, closest])
+    rows = [
+        ("hand", touches.own_joints_mm(angles)),
+        ("character", touches.joints(touches.orientations(angles)) / touches.units_a_mm),
+    ]
+    size = touches.retargeting.bones.skeleton.dimensions.hand_length_mm
+    parts = []
+    for row, (name, joints) in enumerate(rows):
+        seen = joints @ touches.retargeting.palm
+        for column, pose in enumerate(("flat", "fist", "closest touch")):
+            x, y = column * _SIZE, row * (_SIZE + 20)
+            parts.append(f'<text x="{x + 6}" y="{y + 14}" font-size="12">{name}, {pose}</text>')
+            for finger in seen[column]:
+                line = np.concatenate([np.zeros((1, 3)), finger]) @ np.array(_VIEW).T
+                line *= (_SIZE - 40) / size
+                places = " ".join(
+                    f"{x + _SIZE / 2 - u:.1f},{y + _SIZE - 5 + v:.1f}" for u, v in line.tolist()
+                )
+                parts.append(
+                    f'<polyline points="{places}" fill="none" stroke="currentColor" stroke-width="4" '
+                    f'stroke-linejoin="round" stroke-linecap="round" opacity="0.75"/>'
+                )
+    width, height = 3 * _SIZE, 2 * (_SIZE + 20)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
+        f'height="{height}" role="img" aria-label="Hand and character: flat, fist, closest touch" '
+        f'fill="currentColor">{"".join(parts)}</svg>'
+    )
