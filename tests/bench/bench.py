@@ -1,8 +1,8 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Five parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
-to pose through real zenoh, inverse kinematics against mink, the studio's Live page in a browser, and live
-bridges. Figures and the picture go to a folder.
+Six parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+to pose through real zenoh, inverse kinematics against mink, the studio's Live page in a browser, live
+bridges, and retargeting to skeletons like those of other programs. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ PARTS = {
     "inverse-kinematics": "inverse_kinematics_bench.py",
     "studio": "studio_bench.py",
     "bridges": "bridges_bench.py",
+    "retargeting": "retargeting_table.py",
 }
-USUAL = tuple(name for name in PARTS if name not in ("studio", "bridges"))
-"""These want a quiet computer, the studio a browser too."""
+USUAL = tuple(name for name in PARTS if name not in ("studio", "bridges", "retargeting"))
+"""The first two want a quiet computer, the studio a browser too; the last has no peer."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 

@@ -54,11 +54,11 @@ class CharacterFit:
         own = touches.own_joints_mm(angles)
         shown = touches.joints(touches.orientations(angles)) / touches.units_a_mm
         away = np.linalg.norm(own[:, :, -1] - shown[:, :, -1], axis=2)
-        mapping = touches.retargeting.mapping
+        mapping, names = touches.retargeting.mapping, touches.retargeting.bones.names
         near, lost, closest = _touched(touches, own, shown)
         return cls(
-            motion.skeleton.hand, mapping,
-            tuple(name for name in touches.retargeting.bones.names if name not in mapping),
+            motion.skeleton.hand, {name: mapping[name] for name in names if name in mapping},
+            tuple(name for name in names if name not in mapping),
             float(np.sqrt((away**2).mean())), int(near.sum()), int(lost.sum()),
             _picture(touches, angles[closest]),
         )  # fmt: skip

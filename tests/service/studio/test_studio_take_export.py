@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Any
 
 import pygltflib
 import pytest
 from playwright.sync_api import expect
-from studio_support import Open, serious
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "exports"))
+
+from characters import write_character
+from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
 
@@ -39,10 +45,35 @@ def test_the_browser_saves_a_take_as_gltf_with_measured_angles(
     expect(page.get_by_text("was written: it is among your downloads")).to_be_visible()
     path = tmp_path / "saved.glb"
     saved.value.save_as(path)
-    document = pygltflib.GLTF2.load_binary(str(path))
-    assert document is not None
+    document: Any = pygltflib.GLTF2.load_binary(str(path))
     assert document.animations[0].channels
     assert document.asset.extras["right"]["measured"]
+    assert seen.complaints == []
+
+
+def test_a_character_moves_and_the_page_shows_which_bone_is_which(
+    opened: Open, take: str, tmp_path: Path
+) -> None:
+    write_character(tmp_path / "hero.glb", "mixamo")
+    seen = opened(f"take?id={take}")
+    page = seen.page
+    page.get_by_text("Export for animation tools and analysis").click()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Choose a character (.glb)").click()
+    chooser.value.set_files(tmp_path / "hero.glb")
+    bones = page.get_by_role("region", name="Which bone is which, right hand")
+    expect(bones.get_by_role("row", name="index proximal mixamorig:RightHandIndex1")).to_be_visible(
+        timeout=PATIENCE_MS
+    )
+    expect(page.get_by_role("img", name="Hand and character")).to_be_visible()
+    assert serious(page) == []
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Export the motion").click()
+    saved.value.save_as(tmp_path / "moved.glb")
+    document: Any = pygltflib.GLTF2.load_binary(str(tmp_path / "moved.glb"))
+    moved = {document.nodes[channel.target.node].name for channel in document.animations[0].channels}
+    assert "mixamorig:RightHandIndex1" in moved
+    assert not any("Left" in name for name in moved)
     assert seen.complaints == []
 
 

@@ -1,0 +1,66 @@
+"""How far fingertips are, and how many touches are lost, on skeletons like those of five programs:
+``python3 do.py bench retargeting``. The skeletons are made up (``tests/models/retargeting/rigs.py``)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "models" / "retargeting"))
+
+from rigs import CONVENTIONS, rig_like
+
+from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.touches import NEAR_MM, Touches
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS
+from glovecal_models.hand.skeleton import hand_skeleton
+
+POSES, DRAWN, SEED, LOST_MM = 500, 20_000, 11, 10.0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--smoke", action="store_true")
+    options = parser.parse_args()
+    drawn_poses = 2_000 if options.smoke or options.quick else DRAWN
+    found = {}
+    low, high = np.array([ACTIVE_RANGE_DEG[name] for name in hand_skeleton().rotations]).T
+    drawn = np.random.default_rng(SEED).uniform(low, high, (drawn_poses, len(low)))
+    print("| like | fingertips, mm | touches lost without, with keeping them |\n|---|---|---|")
+    for name, convention in CONVENTIONS.items():
+        away, counts = [], np.zeros(3, int)
+        for hand in HANDS:
+            touches = Touches(Retargeting.of(hand_skeleton(hand=hand), rig_like(convention, hand)))
+            thumb = list(touches.chains).index("thumb")
+
+            def gaps(joints: np.ndarray, thumb: int = thumb) -> np.ndarray:
+                tips = joints[:, :, -1]
+                return np.linalg.norm(np.delete(tips - tips[:, [thumb]], thumb, axis=1), axis=2)
+
+            own = touches.own_joints_mm(drawn)
+            near = np.flatnonzero((gaps(own) < NEAR_MM).any(axis=1))[:POSES]
+            free = np.arange(POSES)
+            shown = touches.joints(touches.orientations(drawn[free])) / touches.units_a_mm
+            away.append(np.linalg.norm(own[free, :, -1] - shown[:, :, -1], axis=2).reshape(-1))
+            turned = (touches.retargeting.orientations(drawn[near]), touches.orientations(drawn[near]))
+            closed = gaps(own[near]) < NEAR_MM
+            counts[0] += len(near)
+            for place, orientations in enumerate(turned, 1):
+                other = gaps(touches.joints(orientations) / touches.units_a_mm)
+                counts[place] += (closed & (other > gaps(own[near]) + LOST_MM)).any(axis=1).sum()
+        rms = float(np.sqrt((np.concatenate(away) ** 2).mean()))
+        found[name] = {"fingertip_rms_mm": rms, "touches": counts.tolist()}
+        print(f"| {name} | {rms:.1f} | {counts[1]}, {counts[2]} of {counts[0]} |")
+    if options.json is not None:
+        options.json.write_text(json.dumps(found))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
