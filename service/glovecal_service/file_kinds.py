@@ -8,7 +8,7 @@ from typing import Literal
 
 from glovecal_client.capture.cyberglove3.card import card_layout
 from glovecal_service.exports.motion_files import formats as motion_files
-from glovecal_service.vendor_calibrations import formats as vendor_calibrations
+from glovecal_service.exports.vendor_calibrations import formats as vendor_calibrations
 
 FileKind = Literal["model", "calibration", "motion", "card", "table"]
 LOOKED_AT = 65536

@@ -87,22 +87,29 @@ def ros2(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
 
 
 def vmc(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
+    return _datagrams(host, port, {b"RightIndexProximal": gloves[0], b"LeftIndexProximal": gloves[1]})
+
+
+def unreal(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
+    return _datagrams(host, port, {f"glovecal_{glove}".encode(): glove for glove in gloves})
+
+
+def _datagrams(host: str, port: int, glove_of: dict[bytes, str]) -> Iterator[Arrival]:
+    """By what stands in the datagrams of each glove."""
     import socket
 
-    hands = {b"RightIndexProximal": gloves[0], b"LeftIndexProximal": gloves[1]}
     yield "", None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         opened.bind((host, port))
         while True:
             datagram = opened.recv(65536)
-            for name, glove in hands.items():
-                if name in datagram:
+            for mark, glove in glove_of.items():
+                if mark in datagram:
                     yield glove, None
 
 
 KINDS: dict[str, Callable[[str, int, tuple[str, ...]], Iterator[Arrival]]] = {
-    each.__name__: each for each in (websocket, foxglove, lsl, ros2, vmc)
+    each.__name__: each for each in (websocket, foxglove, lsl, ros2, vmc, unreal)
 }
 
 

@@ -35,7 +35,7 @@ from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 RATE_HZ = 120.0
 RECEIVERS = Path(__file__).with_name("bridge_receivers.py")
-BRIDGES = ("websocket", "lsl", "ros2", "foxglove", "vmc")
+BRIDGES = ("websocket", "lsl", "ros2", "foxglove", "vmc", "unreal")
 ADDED_P99_MS, LIVE_AGAIN_S = 3.0, 2.0
 """What issue 34 asks for."""
 _BOTH_READ = {"websocket", "lsl", "ros2", "foxglove"}
@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     pin_blas_to_one_thread()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process of ours stays behind
     seconds, kills = (2.0, 1) if options.smoke else (10.0, 5) if options.quick else (30.0, 20)
     figures = [measure(name, seconds, kills) for name in (BRIDGES[:1] if options.smoke else BRIDGES)]
     show(figures, kills)
@@ -67,7 +68,7 @@ def measure(bridge: str, seconds: float, kills: int) -> dict[str, Any]:
         if bridge == "ros2":
             address = endpoint.removeprefix("tcp/")
         host, port = address.split(":")
-        place = ("--to", address) if bridge in ("ros2", "vmc") else ("--port", port)
+        place = ("--to", address) if bridge in ("ros2", "vmc", "unreal") else ("--port", port)
         place = () if bridge == "lsl" else place
         opened = running.enter_context(_Bridge.started(endpoint, bridge, place, gloves))
         names = tuple(glove.replace("-", "_") for glove in gloves) if bridge == "ros2" else gloves

@@ -476,10 +476,10 @@ def _numbers(value: Any, count: int, what: str) -> Any:
 
 
 def _unit(value: Any, count: int, what: str) -> Any:
-    found = _numbers(value, count, what)
-    if abs(math.hypot(*found) - 1.0) > _OFF_UNIT:
-        raise BadInput(f"{what} has length {math.hypot(*found):g}, expected 1")
-    return found
+    vector = _numbers(value, count, what)
+    if abs(math.hypot(*vector) - 1.0) > _OFF_UNIT:
+        raise BadInput(f"{what} has length {math.hypot(*vector):g}, expected 1")
+    return vector
 
 
 def _shown(value: Any) -> str:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from glovecal_models.hand.bones import HandBones
-from glovecal_models.hand.skeleton import Joint, Quaternion
+from glovecal_models.hand.skeleton import Joint, Quaternion, Vector
 
 NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
@@ -28,6 +28,12 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 def inverse(q: Quaternion) -> Quaternion:
     """Of a unit quaternion."""
     return q[0], -q[1], -q[2], -q[3]
+
+
+def moved(q: Quaternion, vector: Vector) -> Vector:
+    """``vector`` turned by ``q``."""
+    _, x, y, z = product(product(q, (0.0, *vector)), inverse(q))
+    return x, y, z
 
 
 class BoneTurns:

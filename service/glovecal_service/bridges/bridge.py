@@ -219,13 +219,10 @@ class _GloveFeed:
     def _run(self) -> None:
         while not self._is_over.is_set():
             arrival = self._poses.wait_arrival(STALE_AFTER_S)
-            hand, is_new = (
-                self._silent() if arrival is None else self._understood(*arrival),
-                arrival is not None,
-            )
+            hand = self._silent() if arrival is None else self._understood(*arrival)
             if hand is None or self._is_over.is_set():
                 continue
-            self._traffic.note_taken(hand, is_new=is_new)
+            self._traffic.note_taken(hand, is_new=arrival is not None)
             try:
                 with self._sending:
                     self._bridge.send(hand)

@@ -8,6 +8,7 @@ from glovecal_service.bridges.bridge import Bridge
 from glovecal_service.bridges.foxglove import FoxgloveBridge
 from glovecal_service.bridges.lsl import LslBridge
 from glovecal_service.bridges.ros2 import Ros2Bridge
+from glovecal_service.bridges.unreal import UnrealBridge
 from glovecal_service.bridges.vmc import VmcBridge
 from glovecal_service.bridges.websocket import WebSocketBridge
 
@@ -17,6 +18,7 @@ BRIDGES: dict[str, type[Bridge]] = {
     "ros2": Ros2Bridge,
     "foxglove": FoxgloveBridge,
     "vmc": VmcBridge,
+    "unreal": UnrealBridge,
 }
 
 

@@ -1,11 +1,7 @@
 """Fingers for avatars by the Virtual Motion Capture protocol: OSC in datagrams, Unity's axes and bone names.
 
 An assistant in the protocol's words: it adds fingers to a body that another program moves. Each bone's
-rotation is local, and none in the T-pose of the VRM specification: fingers straight along the arm, palm down,
-the thumb level and 45 degrees from the fingers. Unity's axes are left-handed: y up, the avatar faces z, so
-the right arm lies along x and the left one against it. Positions are 0: an avatar keeps its own sizes.
-
-    glove p, quaternion (v, w)  ->  M p, (-M v, w)      M turns over: its determinant is -1
+rotation is local, and none in the T-pose (``t_pose.py``). Positions are 0: an avatar keeps its own sizes.
 
 ``/VMC/Ext/OK`` says tracking 1 while every glove is live and each of its angles usable, else 0. While poses
 are stale or uncalibrated it comes alone, without bones; a bone whose angle is not usable keeps still.
@@ -13,27 +9,18 @@ are stale or uncalibrated it comes alone, without bones; a bone whose angle is n
 
 from __future__ import annotations
 
-import math
 import struct
-from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import ClassVar
 
-from glovecal_models.hand.bones import DISTAL, HAND, INTERMEDIATE, METACARPAL, PHALANGES, PROXIMAL, HandBones
-from glovecal_models.hand.rotations import Handedness
-from glovecal_models.hand.skeleton import Quaternion, Vector
-from glovecal_service.bridges.bone_turns import NO_TURN, inverse, product
+from glovecal_models.hand.bones import DISTAL, INTERMEDIATE, METACARPAL, PROXIMAL
 from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
 from glovecal_service.bridges.datagrams import DatagramSender
 from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
+from glovecal_service.bridges.t_pose import FingerBone, finger_bones
 from glovecal_service.bridges.traffic import Traffic
 
 DEFAULT_ADDRESS = f"{LOOPBACK}:39540"
-UNITY_AXES: dict[Handedness, tuple[Vector, Vector, Vector]] = {
-    "right": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-    "left": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
-}
-"""M of each hand: from the hand's frame to Unity's, the arm in T-pose."""
 _UNITY_FINGERS = {"thumb": "Thumb", "index": "Index", "middle": "Middle", "ring": "Ring", "pinky": "Little"}
 _UNITY_PARTS = {PROXIMAL: "Proximal", INTERMEDIATE: "Intermediate", DISTAL: "Distal"}
 _THUMB_PARTS = {METACARPAL: "Proximal", PROXIMAL: "Intermediate", DISTAL: "Distal"}
@@ -73,8 +60,8 @@ class VmcBridge(Bridge):
         if moved is not None:
             messages.append(_message("/VMC/Ext/T", "f", hand.pose.monotonic_ns / 1e9))
             messages += [
-                _message("/VMC/Ext/Bone/Pos", "sfffffff", name, 0.0, 0.0, 0.0, *quaternion)
-                for name, quaternion in unity_fingers(*moved)
+                _message("/VMC/Ext/Bone/Pos", "sfffffff", _unity_name(hand, bone), *_turned(bone))
+                for bone in finger_bones(*moved)
             ]
         if not self._sender.send(_bundle(messages)) or (moved is None and hand.state == "live"):
             self._traffic.note_left_out(hand.glove)
@@ -93,36 +80,15 @@ class VmcBridge(Bridge):
             self._sender = None
 
 
-def unity_fingers(
-    bones: HandBones, turned: Sequence[Quaternion]
-) -> Iterator[tuple[str, tuple[float, float, float, float]]]:
-    """Unity's name and local rotation (x, y, z, w) of each finger bone, of bones turned in their parents'
-    frames."""
-    hand = bones.skeleton.hand
-    for finger, parts in PHALANGES.items():
-        rest = thumb_in_t_pose(hand) if finger == "thumb" else NO_TURN
-        for part in parts:
-            bone = bones.names.index(f"{finger}_{part}")
-            local, carrier = turned[bone], bones.parents[bone]
-            if carrier is not None and bones.names[carrier] == "pinky_metacarpal":  # Unity has none
-                local, carrier = product(turned[carrier], local), bones.parents[carrier]
-            if carrier is not None and bones.names[carrier] != HAND:
-                local = product(rest, local)
-            w, *along = product(local, inverse(rest))
-            x, y, z = (-sum(m * v for m, v in zip(row, along, strict=True)) for row in UNITY_AXES[hand])
-            names = _THUMB_PARTS if finger == "thumb" else _UNITY_PARTS
-            yield f"{hand.capitalize()}{_UNITY_FINGERS[finger]}{names[part]}", (x, y, z, w)
+def _unity_name(hand: GlovePose, bone: FingerBone) -> str:
+    parts = _THUMB_PARTS if bone.finger == "thumb" else _UNITY_PARTS
+    return f"{str(hand.meaning.hand).capitalize()}{_UNITY_FINGERS[bone.finger]}{parts[bone.part]}"
 
 
-def thumb_in_t_pose(hand: Handedness) -> Quaternion:
-    """Of its bones in the hand's frame: x along the bone, 45 degrees between fingers and side; z out of the
-    nail, away from the fingers."""
-    half = math.sqrt(0.5)
-    towards = half if hand == "right" else -half
-    first_about_x: Quaternion = (half, -towards, 0.0, 0.0)
-    return product(
-        (math.cos(math.pi / 8), 0.0, 0.0, math.copysign(math.sin(math.pi / 8), towards)), first_about_x
-    )
+def _turned(bone: FingerBone) -> tuple[float, ...]:
+    """No position, then the quaternion as x, y, z, w."""
+    w, x, y, z = bone.turn
+    return 0.0, 0.0, 0.0, x, y, z, w
 
 
 def _bundle(messages: list[bytes]) -> bytes:

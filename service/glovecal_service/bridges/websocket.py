@@ -38,6 +38,8 @@ _PATH = re.compile(r"/(?:(?P<binary>binary)/(?P<only>[^/?]+)|(?P<glove>(?!binary
 _MOST_WAITING_BYTES = 16_384
 """Of a receiver that does not read: some dozen poses in the system, then newer ones replace older ones."""
 _LARGEST_INPUT_BYTES = 1024
+_CLOSE_WITHIN_S = 1.0
+"""At the end, for a receiver that does not read."""
 
 
 class WebSocketBridge(Bridge):
@@ -116,6 +118,7 @@ class WebSocketBridge(Bridge):
         async with serve(
             self._attend, self._host, self._port, origins=allowed, process_request=_check_path,
             compression=None, max_size=_LARGEST_INPUT_BYTES, write_limit=_MOST_WAITING_BYTES,
+            close_timeout=_CLOSE_WITHIN_S,
         ) as server:  # fmt: skip
             self._loop = asyncio.get_running_loop()
             is_up.set_result(next(iter(server.sockets)).getsockname()[1])

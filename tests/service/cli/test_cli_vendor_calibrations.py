@@ -7,8 +7,8 @@ from pathlib import Path
 from cli_running import Run
 
 from glovecal_models.layout import Layout
-from glovecal_service.vendor_calibrations import cyberglove
-from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
+from glovecal_service.exports.vendor_calibrations import cyberglove
+from glovecal_service.exports.vendor_calibrations.calibration_format import Counts, SensorLine
 
 SENSORS = Layout.built_in("cyberglove22").sensors
 

@@ -21,8 +21,8 @@ from glovecal_service.exports import hand_motion
 from glovecal_service.exports.body_markers import read_trc
 from glovecal_service.exports.formats import FORMATS
 from glovecal_service.exports.hand_motion import HandMotion
-from glovecal_service.vendor_calibrations.calibration_format import Counts
-from glovecal_service.vendor_calibrations.shadow import read_xml
+from glovecal_service.exports.vendor_calibrations.calibration_format import Counts
+from glovecal_service.exports.vendor_calibrations.shadow import read_xml
 
 MANY = 100_000
 SOON_S = 20.0

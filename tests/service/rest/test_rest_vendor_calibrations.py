@@ -6,8 +6,8 @@ import pytest
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.layout import Layout
-from glovecal_service.vendor_calibrations import cyberglove
-from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
+from glovecal_service.exports.vendor_calibrations import cyberglove
+from glovecal_service.exports.vendor_calibrations.calibration_format import Counts, SensorLine
 
 SENSORS = Layout.built_in("cyberglove22").sensors
 TEXT = cyberglove.write_asr(dict.fromkeys(SENSORS, SensorLine(0.8, 60.0)), Counts(1.0, 255.0), "right")

@@ -20,8 +20,8 @@ from glovecal_models.layout import Layout
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
 from glovecal_service.exports.formats import FORMATS as EXPORTS
 from glovecal_service.exports.hand_motion import HandMotion
-from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
-from glovecal_service.vendor_calibrations.formats import FORMATS
+from glovecal_service.exports.vendor_calibrations.calibration_format import Counts, SensorLine
+from glovecal_service.exports.vendor_calibrations.formats import FORMATS
 
 pytestmark = pytest.mark.needs_chromium
 FINGERS = ("T_IP", "I_PIP", "M_PIP", "R_PIP", "P_PIP")

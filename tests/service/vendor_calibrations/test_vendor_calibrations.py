@@ -20,16 +20,16 @@ from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import evaluation_segment
 from glovecal_models.simulation.simulated_glove import SimulatedGlove, simulate_take
-from glovecal_service.vendor_calibrations import cyberglove
-from glovecal_service.vendor_calibrations.calibration_format import Counts, SensorLine
-from glovecal_service.vendor_calibrations.formats import (
+from glovecal_service.exports.vendor_calibrations import cyberglove
+from glovecal_service.exports.vendor_calibrations.calibration_format import Counts, SensorLine
+from glovecal_service.exports.vendor_calibrations.formats import (
     FORMATS,
     calibration_format,
     read_model,
     recognised,
     write_model,
 )
-from glovecal_service.vendor_calibrations.shadow import lines_through
+from glovecal_service.exports.vendor_calibrations.shadow import lines_through
 
 LAYOUT22, LUCID = Layout.built_in("cyberglove22"), Layout.built_in("lucidglove")
 EIGHT, TWELVE = Counts(1.0, 255.0), Counts(1.0, 4095.0)

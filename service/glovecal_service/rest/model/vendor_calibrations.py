@@ -13,6 +13,18 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.layout import Layout
+from glovecal_service.exports.vendor_calibrations.calibration_format import FoundLines
+from glovecal_service.exports.vendor_calibrations.formats import (
+    FORMATS,
+    MOST_CHARACTERS,
+    FormatName,
+    calibration_format,
+    calibration_text,
+    read_model,
+    recognised,
+    rotation_line,
+    write_model,
+)
 from glovecal_service.request_types import Identifier, Sha256, StrictBody, SubjectName
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import change_problems, problems
@@ -26,18 +38,6 @@ from glovecal_service.rest.model.answer import (
 from glovecal_service.rest.model.model_import import ModelImport, import_artifact
 from glovecal_service.rest.take.uploaded_files import kept_upload
 from glovecal_service.store.errors import NotFound
-from glovecal_service.vendor_calibrations.calibration_format import FoundLines
-from glovecal_service.vendor_calibrations.formats import (
-    FORMATS,
-    MOST_CHARACTERS,
-    FormatName,
-    calibration_format,
-    calibration_text,
-    read_model,
-    recognised,
-    rotation_line,
-    write_model,
-)
 
 router = APIRouter(prefix="/models", tags=["models"])
 

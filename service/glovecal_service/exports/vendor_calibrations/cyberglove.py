@@ -26,7 +26,7 @@ from collections.abc import Mapping
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.presentation.document import counted
-from glovecal_service.vendor_calibrations.calibration_format import (
+from glovecal_service.exports.vendor_calibrations.calibration_format import (
     CalibrationFormat,
     Counts,
     FoundLines,

@@ -22,7 +22,7 @@ from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, FINGERS, Handedness
 from glovecal_models.names import did_you_mean
-from glovecal_service.vendor_calibrations.calibration_format import (
+from glovecal_service.exports.vendor_calibrations.calibration_format import (
     CalibrationFormat,
     Counts,
     FoundLines,

@@ -19,7 +19,7 @@ from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.names import did_you_mean
 from glovecal_models.regression.linear_regressor import LinearRegressor, gains_of, line_of
 from glovecal_models.regression.regressor import RuleRegressor
-from glovecal_service.vendor_calibrations.calibration_format import (
+from glovecal_service.exports.vendor_calibrations.calibration_format import (
     MOST_CHARACTERS,
     CalibrationFormat,
     Counts,
@@ -27,9 +27,9 @@ from glovecal_service.vendor_calibrations.calibration_format import (
     SensorLine,
     require_lines,
 )
-from glovecal_service.vendor_calibrations.cyberglove import ASR, VIRTUALHAND
-from glovecal_service.vendor_calibrations.finger_ranges import JOINTS, LEROBOT, OPENGLOVES
-from glovecal_service.vendor_calibrations.shadow import SHADOW_XML, SHADOW_YAML
+from glovecal_service.exports.vendor_calibrations.cyberglove import ASR, VIRTUALHAND
+from glovecal_service.exports.vendor_calibrations.finger_ranges import JOINTS, LEROBOT, OPENGLOVES
+from glovecal_service.exports.vendor_calibrations.shadow import SHADOW_XML, SHADOW_YAML
 
 ASSUMED_SD_DEG = 5.0
 """Near the 4.45 degrees of gains that others were calibrated with (Gracia-Ibanez et al. 2017, precision)."""

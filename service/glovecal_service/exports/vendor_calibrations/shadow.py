@@ -19,7 +19,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
-from glovecal_service.vendor_calibrations.calibration_format import (
+from glovecal_service.exports.vendor_calibrations.calibration_format import (
     CalibrationFormat,
     Counts,
     FoundLines,
