@@ -13,7 +13,6 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 from glovecal_client.clock import clock_ns, wall_ns
-from glovecal_client.operating_system import listen_alone
 from glovecal_models.errors import BadInput
 from glovecal_service.rest.http.request_guard import is_loopback
 from glovecal_service.triggers.formats import Endpoint
@@ -124,7 +123,6 @@ class Listener:
             )
         opened = socket.socket(socket.AF_INET6 if ":" in endpoint.host else socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            listen_alone(opened)
             opened.settimeout(LOOK_EVERY_S)
             opened.bind((endpoint.host, endpoint.port))
         except OSError as error:
