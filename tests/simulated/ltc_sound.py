@@ -36,7 +36,7 @@ def ltc_sound(
     drop: bool = False,
     oversampling: int = 20,
 ) -> np.ndarray:
-    """(N,) samples: silence for ``begin_s``, then a frame for each label; edges rise within a sample or two."""
+    """(N,) samples: silence for ``begin_s``, then a frame for each label; edges rise within a sample."""
     bits = [bit for label in labels for bit in frame_bits(*label, drop=drop)]
     bit_s, level, times, levels = 1 / frames_per_s / 80, 1.0, [0.0], [0.0]
     for number, bit in enumerate(bits):

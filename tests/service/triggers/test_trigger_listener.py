@@ -19,8 +19,8 @@ from realtime_support import eventually
 from trigger_packets import RECORD_START, START, STOP, natnet
 
 from glovecal_models.errors import BadInput
-from glovecal_service.triggers.formats import Endpoint
-from glovecal_service.triggers.listener import Listener, senders_of
+from glovecal_service.recorder.triggers.formats import Endpoint
+from glovecal_service.recorder.triggers.listener import Listener, senders_of
 
 HERE = "127.0.0.1"
 Listen = Callable[..., Listener]

@@ -16,11 +16,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from trigger_packets import RECORD_START, RECORD_STOP, START, STOP, natnet
 
 from glovecal_models.errors import BadInput
-from glovecal_service.triggers.formats import TRIGGERS, Endpoint
-from glovecal_service.triggers.listener import senders_of
-from glovecal_service.triggers.natnet import NatNet
-from glovecal_service.triggers.osc import Osc, encode_message
-from glovecal_service.triggers.trigger import Trigger, UnknownPacket, one_line, safe_name
+from glovecal_service.recorder.triggers.formats import TRIGGERS, Endpoint
+from glovecal_service.recorder.triggers.listener import senders_of
+from glovecal_service.recorder.triggers.natnet import NatNet
+from glovecal_service.recorder.triggers.osc import Osc, encode_message
+from glovecal_service.recorder.triggers.trigger import Trigger, UnknownPacket, one_line, safe_name
 
 
 def read(protocol: str, *packets: bytes):
@@ -29,12 +29,18 @@ def read(protocol: str, *packets: bytes):
     return [reader.read(packet) for packet in packets][-1]
 
 
+def trigger(protocol: str, *packets: bytes) -> Trigger:
+    asked = read(protocol, *packets).trigger
+    assert asked is not None
+    return asked
+
+
 def test_vicons_packets() -> None:
-    assert read("vicon", START).trigger == Trigger(
+    assert trigger("vicon", START) == Trigger(
         "start", name="Walk 01", packet_id="28472", notes="slow & wide", description="second day",
         time_code="10:20:30:12", delay_s=0.033,
     )  # fmt: skip
-    stop = read("vicon", STOP).trigger
+    stop = trigger("vicon", STOP)
     assert (stop.action, stop.name, stop.packet_id, stop.result) == ("stop", "Walk 01", "28473", "SUCCESS")
     assert read("vicon", STOP).when_done == b"", "nobody is answered"
 
@@ -52,12 +58,12 @@ def test_vicons_packets() -> None:
     ids=["no NUL", "NULs", "byte order mark", "small letters", "padding", "a namespace"],
 )
 def test_the_same_packet_as_others_write_it(packet: bytes) -> None:
-    found = read("motive", packet).trigger
+    found = trigger("motive", packet)
     assert (found.action, found.name, found.packet_id) == ("start", "Walk 01", "28472")
 
 
 def test_a_name_that_is_not_utf_8_is_latin() -> None:
-    assert read("vicon", START.replace(b"Walk 01", b"G\xe4nge")).trigger.name == "Gänge"
+    assert trigger("vicon", START.replace(b"Walk 01", b"G\xe4nge")).name == "Gänge"
 
 
 BOMB = b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]><CaptureStart><Name VALUE="&b;"/>'
@@ -86,8 +92,8 @@ def test_hostile_xml_is_refused(packet: bytes, why: str) -> None:
 
 @pytest.mark.parametrize("delay", ["", "nan", "-5", "inf", "1e300", "soon"])
 def test_odd_delays(delay: str) -> None:
-    found = read("vicon", START.replace(b'"33"', f'"{delay}"'.encode()))
-    assert 0.0 <= found.trigger.delay_s <= 60.0
+    found = trigger("vicon", START.replace(b'"33"', f'"{delay}"'.encode()))
+    assert 0.0 <= found.delay_s <= 60.0
 
 
 def test_natnet_commands() -> None:
@@ -97,24 +103,24 @@ def test_natnet_commands() -> None:
     started = reader.read(natnet("StartRecording"))
     assert started.trigger == Trigger("start", name="Run, fast")
     assert (started.when_done[-4:], started.when_refused[-4:]) == (b"\0\0\0\0", b"\x01\0\0\0")
-    assert reader.read(natnet("StopRecording")).trigger == Trigger("stop", name="Run, fast")
-    assert reader.read(natnet("StartRecording")).trigger == Trigger("start"), "the name was for one take"
+    assert reader.trigger(natnet("StopRecording")) == Trigger("stop", name="Run, fast")
+    assert reader.trigger(natnet("StartRecording")) == Trigger("start"), "the name was for one take"
     other = reader.read(natnet("LiveMode"))
     assert (other.trigger, other.when_done) == (None, struct.pack("<HH", 100, 0))
 
 
 def test_live_link_faces_messages() -> None:
-    assert read("osc", RECORD_START).trigger == Trigger("start", name="Scene_4")
+    assert trigger("osc", RECORD_START) == Trigger("start", name="Scene_4")
     stop = read("osc", RECORD_STOP)
     assert stop.trigger == Trigger("stop")
     assert stop.when_done.startswith(b"/RecordStopConfirm\0\0,sss\0\0\0\x0000:00:00.000\0\0\0\0")
     slate, take = b"/Slate\0\0,s\0\0B\0\0\0", b"/Take\0\0\0,i\0\0\0\0\0\x07"
     bare = b"/RecordStart\0\0\0\0,\0\0\0"
-    assert read("osc", slate, take, bare).trigger == Trigger("start", name="B_7")
+    assert trigger("osc", slate, take, bare) == Trigger("start", name="B_7")
     target = b"/OSCSetSendTarget\0\0\0,si\0" + b"10.9.9.9\0\0\0\0" + struct.pack(">i", 6000)
     assert read("osc", target, RECORD_START).answer_port == 6000, "never another computer's"
     bundle = b"#bundle\0" + b"\0" * 7 + b"\x01" + struct.pack(">i", len(RECORD_START)) + RECORD_START
-    assert read("osc", bundle).trigger == Trigger("start", name="Scene_4")
+    assert trigger("osc", bundle) == Trigger("start", name="Scene_4")
 
 
 @pytest.mark.parametrize("protocol", ["vicon", "natnet", "osc"])
@@ -122,12 +128,12 @@ def test_live_link_faces_messages() -> None:
 def test_what_we_send_is_read_as_it_was_meant(protocol: str, name: str) -> None:
     form = TRIGGERS[protocol]
     sent = Trigger("start", name, "77")
-    found = read(protocol, *form.packets(sent)).trigger
+    found = trigger(protocol, *form.packets(sent))
     assert (found.action, found.name) == (
         "start",
         f"{name}_1" if protocol == "osc" and "_" not in name else name,
     )
-    assert read(protocol, *form.packets(Trigger("stop", name, "78"))).trigger.action == "stop"
+    assert trigger(protocol, *form.packets(Trigger("stop", name, "78"))).action == "stop"
 
 
 def test_what_we_send_is_what_others_document() -> None:
@@ -205,4 +211,4 @@ def test_endpoints() -> None:
 
 def test_osc_texts_are_padded_to_four_bytes() -> None:
     assert encode_message("/abc", "abc") == b"/abc\0\0\0\0,s\0\0abc\0"
-    assert Osc().read(encode_message("/Slate", "abcd")).trigger is None
+    assert Osc().trigger(encode_message("/Slate", "abcd")) is None

@@ -18,9 +18,9 @@ from glovecal_service.cli.terminal.options import identifier
 from glovecal_service.cli.terminal.printing import err, out
 
 if TYPE_CHECKING:
-    from glovecal_service.triggers.announcements import Announcements
-    from glovecal_service.triggers.listener import Listener
-    from glovecal_service.triggers.triggered_recordings import TriggeredRecordings
+    from glovecal_service.recorder.triggers.announcements import Announcements
+    from glovecal_service.recorder.triggers.listener import Listener
+    from glovecal_service.recorder.triggers.triggered_recordings import TriggeredRecordings
 
 LOOK_EVERY_S = 0.1
 AGAIN_AFTER_S, GIVE_UP_AFTER_S = 0.5, 10.0
@@ -51,11 +51,11 @@ def trigger(
         float, typer.Option(min=0, max=600, help="Seconds before each take, for effects with memory.")
     ] = 60.0,
 ) -> None:
-    """Record gloves when another system records (UDP triggers), and tell others of recordings. Until Ctrl-C."""
-    from glovecal_service.triggers.announcements import Announcements
-    from glovecal_service.triggers.formats import Endpoint
-    from glovecal_service.triggers.listener import Listener, senders_of
-    from glovecal_service.triggers.triggered_recordings import TriggeredRecordings
+    """Record when another system does (UDP triggers), and tell others of recordings. Ctrl-C ends it."""
+    from glovecal_service.recorder.triggers.announcements import Announcements
+    from glovecal_service.recorder.triggers.formats import Endpoint
+    from glovecal_service.recorder.triggers.listener import Listener, senders_of
+    from glovecal_service.recorder.triggers.triggered_recordings import TriggeredRecordings
 
     if not listen and not send:
         raise typer.BadParameter("say what to listen for (--listen vicon) or where to send (--send ...)")

@@ -54,29 +54,35 @@ def timecode(
         body = {"time_code": label, "rate": rate, "at_s": at_s}
     with connect() as service:
         row = find_take(stored_takes(service), take)
-        if body is not None or remove:
+        if remove:
+            row = read(TakeRow, service.delete(f"/takes/{row.id}/time-code"))
+        elif body is not None:
             row = read(TakeRow, service.put(f"/takes/{row.id}/time-code", body))
-        found = read(CheckView, service.get(f"/takes/{row.id}/check"))
+        view = read(CheckView, service.get(f"/takes/{row.id}/check"))
     if as_json:
         print_json({"time_code": None if row.time_code is None else row.time_code.document()})
     else:
-        out.print(f"Take {row.name}: {facts_of(found).get('time code', 'no time code is known')}.")
+        out.print(f"Take {row.name}: {_shown(view)}.")
 
 
 def _of_sound(file: Path, rate: str | None, channel: int | None, at_s: float) -> dict[str, Any]:
-    from glovecal_models.takes.ltc import read_ltc
+    from glovecal_service.ltc import read_ltc
 
-    found = read_ltc(file, rate=rate, channel=channel)
-    for sentence in found.sentences:
+    sound = read_ltc(file, rate=rate, channel=channel)
+    for sentence in sound.sentences:
         err.print(sentence)
-    code = found.time_code
+    code = sound.time_code
     return {"time_code": code.label, "rate": code.rate, "at_s": at_s + code.time_s, "source": code.source}
 
 
-def facts_of(found: CheckView) -> dict[str, str]:
+def facts_of(view: CheckView) -> dict[str, str]:
     """What is shown of a take's time code; empty where none is known."""
-    code: TimeCode | None = found.take.time_code
-    if code is None or not found.time_codes:
+    code: TimeCode | None = view.take.time_code
+    if code is None or not view.time_codes:
         return {}
-    first, last = found.time_codes
+    first, last = view.time_codes
     return {"time code": f"{first} to {last}, {code.counting.named} frames a second, from {code.source}"}
+
+
+def _shown(view: CheckView) -> str:
+    return "".join(f"{name} {value}" for name, value in facts_of(view).items()) or "no time code is known"

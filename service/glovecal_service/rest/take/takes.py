@@ -98,14 +98,19 @@ class TakeTimeCode(StrictBody):
     summary="Say which SMPTE time code a take has",
     responses=change_problems(),
 )
-def put_time_code(id: IdInPath, body: TakeTimeCode | None, store: StoreNeeded) -> TakeRecord:
-    """Kept at the take's clock; exports that hold a time code write it. `null`: none is known."""
-    if body is None:
-        return store.takes.note_time_code(id, None)
+def put_time_code(id: IdInPath, body: TakeTimeCode, store: StoreNeeded) -> TakeRecord:
+    """Kept by the take's clock, beside its frames."""
     time_s = float(store.takes.load_recorded(id).time_s[0]) + body.at_s
     return store.takes.note_time_code(
         id, TimeCode.of_text(body.time_code, body.rate, time_s, plain_text(body.source))
     )
+
+
+@router.delete(
+    "/{id}/time-code", response_model=Take, summary="Forget a take's time code", responses=change_problems()
+)
+def remove_time_code(id: IdInPath, store: StoreNeeded) -> TakeRecord:
+    return store.takes.note_time_code(id, None)
 
 
 class TakeNote(StrictBody):

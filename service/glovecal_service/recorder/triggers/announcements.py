@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from glovecal_models.errors import BadInput
 from glovecal_service.plain import read
+from glovecal_service.recorder.triggers.formats import Endpoint
+from glovecal_service.recorder.triggers.trigger import Trigger
 from glovecal_service.rest.glove.answer import Recording
-from glovecal_service.triggers.formats import Endpoint
-from glovecal_service.triggers.trigger import Trigger
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient

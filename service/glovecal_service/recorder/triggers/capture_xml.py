@@ -8,7 +8,7 @@ import os
 import socket
 from xml.etree import ElementTree
 
-from glovecal_service.triggers.trigger import Request, Trigger, UnknownPacket, one_line
+from glovecal_service.recorder.triggers.trigger import Request, Trigger, UnknownPacket, one_line
 
 LARGEST_PACKET = 16_384
 """Bytes; Vicon's fit into one Ethernet frame."""

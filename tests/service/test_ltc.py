@@ -11,8 +11,8 @@ import pytest
 from ltc_sound import ltc_sound, write_wav
 
 from glovecal_models.errors import BadInput
-from glovecal_models.takes.ltc import decode_ltc, read_ltc
 from glovecal_models.takes.time_code import RATES, Counting
+from glovecal_service.ltc import decode_ltc, read_ltc
 
 BEGIN_S = 0.1
 SOUNDS = [

@@ -81,7 +81,7 @@ class LtcReading:
 
 
 def decode_ltc(samples: np.ndarray, samples_per_s: float) -> LtcFrames:
-    """Frames in ``samples`` (N,), floats with full scale 1 or integers; whatever else is there is passed over.
+    """Frames in ``samples`` (N,), floats with full scale 1 or integers; all else is passed over.
 
     They are read in blocks that overlap by more than a frame, so that each frame is whole in its own.
     """
@@ -182,8 +182,8 @@ def read_ltc(path: Path, *, rate: str | None = None, channel: int | None = None)
     frames = decoded[best]
     if len(frames) < 2:
         raise BadInput(
-            f"{path.name} holds no time code (LTC) in {_channel_names(channel, channels.shape[1])}: is it the "
-            "sound of the time code, recorded loud enough?"
+            f"{path.name} holds no time code (LTC) in {_channel_names(channel, channels.shape[1])}: is it "
+            "the sound of the time code, recorded loud enough?"
         )
     return _reading(frames, rate, path.name, best + 1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from glovecal_service.triggers.trigger import Request, Trigger, UnknownPacket, one_line
+from glovecal_service.recorder.triggers.trigger import Request, Trigger, UnknownPacket, one_line
 
 REQUEST, RESPONSE, UNRECOGNIZED = 2, 3, 100
 """Message numbers of the protocol."""

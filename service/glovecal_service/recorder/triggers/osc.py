@@ -6,7 +6,7 @@ import re
 import struct
 from collections.abc import Sequence
 
-from glovecal_service.triggers.trigger import Request, Trigger, UnknownPacket, one_line
+from glovecal_service.recorder.triggers.trigger import Request, Trigger, UnknownPacket, one_line
 
 LARGEST_PACKET = 16_384
 MOST_ARGUMENTS = 32

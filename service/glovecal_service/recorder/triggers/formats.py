@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
-from glovecal_service.triggers import capture_xml, natnet, osc
-from glovecal_service.triggers.trigger import Reader, Trigger
+from glovecal_service.recorder.triggers import capture_xml, natnet, osc
+from glovecal_service.recorder.triggers.trigger import Reader, Trigger
 
 
 @dataclass(frozen=True)

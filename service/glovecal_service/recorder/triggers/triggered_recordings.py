@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from glovecal_client.clock import computer_id
 from glovecal_client.errors import ServiceError
 from glovecal_service.plain import read
+from glovecal_service.recorder.triggers.listener import Arrival
+from glovecal_service.recorder.triggers.trigger import safe_name
 from glovecal_service.rest.glove.answer import Recording
 from glovecal_service.rest.take.answer import Take
-from glovecal_service.triggers.listener import Arrival
-from glovecal_service.triggers.trigger import safe_name
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
