@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from timecode import Timecode
+from timecode.timecode import Timecode
 
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.time_code import RATES, WITH_DROP, Counting, TimeCode

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import re
 import socket
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from pathlib import Path
 
 import pytest
 from cli_running import Run, Started, glovecal, start
 from realtime_support import eventually, free_endpoint
+from trigger_packets import RECORD_START, RECORD_STOP, START, STOP, natnet
 
 from glovecal_client.rest import RestClient
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "triggers"))
-
-from trigger_packets import RECORD_START, RECORD_STOP, START, STOP, natnet
 
 HERE = "127.0.0.1"
 HANDS = ("right", "left")

@@ -5,16 +5,11 @@ from __future__ import annotations
 import ipaddress
 import socket
 import struct
-import sys
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from queue import Empty
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from realtime_support import eventually
 from trigger_packets import RECORD_START, START, STOP, natnet
 
