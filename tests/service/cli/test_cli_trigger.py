@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
 
 import pytest
 from cli_running import Run, Started, glovecal, start
@@ -56,6 +57,7 @@ class Stage:
     def __init__(self, port: int, live: dict[str, str]) -> None:
         self.run: Run = partial(glovecal, live)
         self._port, self._url = port, live["GLOVECAL_URL"]
+        self.complaints = ""
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((HERE, 0))
         self.socket.settimeout(120)
@@ -104,6 +106,7 @@ def triggered(live: dict[str, str], *options: str, protocol: str = "vicon") -> I
             yield stage
     finally:
         out, complaints = end(process)
+    stage.complaints = complaints
     assert "Traceback" not in complaints
     assert re.search(r"^\d+ triggers", out, re.MULTILINE), out
 
@@ -214,3 +217,25 @@ def test_what_cannot_be_is_refused(live: dict[str, str]) -> None:
     assert "--from, an address or a network such as 192.168.1.0/24" in beyond.said
     assert "is no address or network" in run("trigger", "right", "--listen", "osc", "--from", "me").said
     assert "there is no host" in run("trigger", "right", "--send", "osc:no-such-host.invalid:8000").said
+
+
+def test_a_service_that_is_away_is_told_and_waited_for(tmp_path: Path) -> None:
+    """A start is given up after ten seconds; an end is carried out once the service is back."""
+    port = free_endpoint().rpartition(":")[2]
+    away = {"GLOVECAL_URL": f"http://127.0.0.1:{port}", "GLOVECAL_DATA": str(tmp_path / "none")}
+    with triggered(away, protocol="natnet") as stage:
+        stage.send(natnet("StartRecording"))
+        assert stage.receive()[-4:] == b"\1\0\0\0"
+        stage.send(natnet("StopRecording"))
+        settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_ZENOH": free_endpoint()}
+        process = start(settings | {"GLOVECAL_PORT": port, "GLOVECAL_STUDIO": "no"}, "serve")
+        try:
+            assert stage.receive()[-4:] == b"\1\0\0\0", "nothing was going on"
+        finally:
+            end(process)
+    assert stage.complaints.splitlines() == [
+        "The service does not answer (No service); trying on.",
+        "No recording began: the service did not answer for 10 s.",
+        "The service does not answer (No service); trying on.",
+        "natnet (127.0.0.1): the end of a recording, but no trigger began one here.",
+    ]

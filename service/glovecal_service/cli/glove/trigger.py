@@ -97,13 +97,18 @@ def _work(listener: Listener, recordings: TriggeredRecordings, announcements: An
 
 
 def _once_it_answers(work: Callable[[], bool | None], is_urgent: bool) -> bool | None:
-    """What ``work`` gives. While the service does not answer, try on: what is not urgent (a recording that
-    would begin late) for ``GIVE_UP_AFTER_S``."""
+    """What ``work`` gives; False where the service refuses it. While the service does not answer, try on:
+    what is not urgent (a recording that would begin late) for ``GIVE_UP_AFTER_S``."""
+    from glovecal_service.recorder.triggers.triggered_recordings import is_away
+
     until, is_known = time.monotonic() + GIVE_UP_AFTER_S, False
     while True:
         try:
             return work()
         except ServiceError as error:
+            if not is_away(error):
+                _tell(f"The service refused: {error.detail or error.title}")
+                return False
             if not is_known:
                 _tell(f"The service does not answer ({error.title}); trying on.")
                 is_known = True

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from glovecal_client.clock import computer_id
 from glovecal_client.errors import ServiceError
+from glovecal_client.rest import NoService
 from glovecal_service.plain import read
 from glovecal_service.recorder.triggers.listener import Arrival
 from glovecal_service.recorder.triggers.trigger import safe_name
@@ -21,7 +22,7 @@ SETTLED_WITHIN_S = 10.0
 """An earlier recording of the glove makes its account first."""
 BEGINS_WITHIN_S = 10.0
 LOOK_EVERY_S = 0.02
-CONFLICT = 409
+CONFLICT, UNAVAILABLE = 409, 503
 TRIGGER, START = "trigger", "start"
 """Facts of a recording that a trigger began."""
 
@@ -50,22 +51,32 @@ class TriggeredRecordings:
         return self._stop(arrival)
 
     def _start(self, arrival: Arrival) -> bool:
-        wanted = arrival.trigger.name
-        going_on = self._going_on()
+        wanted, going_on = arrival.trigger.name, self._going_on()
         if going_on and all(_sent_name(one) == wanted for one in going_on):
-            self._tell(f"{_from(arrival)}: {going_on[0].name} is being recorded already.")
-            return True
+            return self._complete(arrival, going_on)
         if going_on:
             self._tell(f"{_from(arrival)}: no end of {going_on[0].name} came; it ends as the next begins.")
             for one in going_on:
                 self._service.post(f"/recordings/{one.id}/stop")
-        name = self._free_name(wanted)
+        return self._begin(arrival, self._free_name(wanted), self._gloves)
+
+    def _complete(self, arrival: Arrival, going_on: Sequence[Recording]) -> bool:
+        """The same start once more: begin those that could not be recorded the first time."""
+        name, recorded = going_on[0].name, {one.glove for one in going_on}
+        missing = [glove for glove in self._gloves if glove not in recorded]
+        if not missing:
+            self._tell(f"{_from(arrival)}: {name} is being recorded already.")
+            return True
+        return self._begin(arrival, name, missing)
+
+    def _begin(self, arrival: Arrival, name: str, gloves: Sequence[str]) -> bool:
         document = {"name": name, "lead_s": self._pre_roll_s, "trigger": self._document(arrival)}
-        begun = [one for glove in self._gloves if (one := self._request(glove, document)) is not None]
+        begun = [one for glove in gloves if (one := self._request(glove, document)) is not None]
         begun = [one for one in begun if self._is_taken_on(one)]
         if begun:
-            gloves = " and ".join(one.glove for one in begun)
-            self._tell(f"{_from(arrival)}: recording {name} of {gloves}.{_renamed(wanted, name)}")
+            recorded = " and ".join(one.glove for one in begun)
+            renamed = _renamed(arrival.trigger.name, name)
+            self._tell(f"{_from(arrival)}: recording {name} of {recorded}.{renamed}")
         return bool(begun)
 
     def _stop(self, arrival: Arrival) -> bool:
@@ -103,7 +114,7 @@ class TriggeredRecordings:
                 if error.status == CONFLICT and self._is_settling(glove) and time.monotonic() < until:
                     time.sleep(LOOK_EVERY_S)
                     continue
-                if not error.status:
+                if is_away(error):
                     raise
                 self._tell(f"Glove {glove} is not recorded: {error.detail or error.title}.")
                 return None
@@ -153,6 +164,11 @@ class TriggeredRecordings:
             "wall_s": arrival.wall_s,
             "computer": computer_id(),
         }
+
+
+def is_away(error: ServiceError) -> bool:
+    """Whether the service may answer later: nobody is there, or its database is busy."""
+    return isinstance(error, NoService) or error.status == UNAVAILABLE
 
 
 def _sent_name(one: Recording) -> str:
