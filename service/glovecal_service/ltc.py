@@ -20,6 +20,8 @@ HALF_OR_WHOLE_S = 0.34e-3
 SHORTEST_S, LONGEST_BIT_S = 0.1e-3, 0.75e-3
 """Of an interval between edges: anything else is no time code, and what follows is read anew."""
 LEVEL_OVER_S = 10e-3
+LEAST_SAMPLES_PER_S = 8000
+"""Fewer tell a half bit from a whole one no more."""
 QUIET = 1e-3
 """Of full scale: below it there is no signal."""
 DEAD_ZONE = 0.25
@@ -199,11 +201,17 @@ def _channels(path: Path) -> tuple[np.ndarray, int]:
     try:
         with wave.open(str(path), "rb") as sound:
             width, count, samples_per_s = sound.getsampwidth(), sound.getnchannels(), sound.getframerate()
-            content = sound.readframes(sound.getnframes())
-    except (wave.Error, EOFError):
+            there = path.stat().st_size // (width * count)  # a damaged header may promise gigabytes
+            content = sound.readframes(min(sound.getnframes(), there))
+    except (wave.Error, EOFError, RuntimeError):  # wave's own complaints of a damaged file
         raise BadInput(
             f"{path.name} cannot be read as WAV with PCM samples; save it as 16-bit WAV and try again"
         ) from None
+    if width > 4 or samples_per_s < LEAST_SAMPLES_PER_S:
+        raise BadInput(
+            f"{path.name} has {8 * width}-bit samples, {samples_per_s} a second; save it with 8 to 32 bits "
+            f"and {LEAST_SAMPLES_PER_S} or more a second"
+        )
     content = content[: len(content) // (width * count) * width * count]
     if width == 3:  # the two upper bytes
         samples = np.frombuffer(content, np.uint8).reshape(-1, 3)[:, 1:].copy().view("<i2")[:, 0]

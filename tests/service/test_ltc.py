@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ltc_sound import ltc_sound, write_wav
 
 from glovecal_models.errors import BadInput
@@ -127,6 +129,25 @@ def test_what_is_no_wav_is_refused(content: bytes, complaint: str, tmp_path: Pat
     path.write_bytes(content)
     with pytest.raises(BadInput, match=complaint):
         read_ltc(path)
+
+
+@given(content=st.binary(max_size=400), at=st.integers(0, 60))
+def test_wild_wav_files_are_refused(
+    content: bytes, at: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A good file's beginning and anything after it."""
+    path = tmp_path_factory.getbasetemp() / "wild.wav"
+    good = write_wav(path, np.zeros((100, 2))).read_bytes()
+    path.write_bytes(good[:at] + content)
+    with pytest.raises(BadInput):
+        read_ltc(path)
+
+
+@pytest.mark.parametrize("samples_per_s", [8000, 11_025, 192_000])
+def test_low_and_high_sample_rates(samples_per_s: int) -> None:
+    _, labels, sound = sound_of("25", False, samples_per_s, count=50)
+    frames = decode_ltc(sound, samples_per_s)
+    assert [tuple(label) for label in frames.labels.tolist()] == whole(labels)
 
 
 def test_noise_silence_and_music_hold_no_time_code(tmp_path: Path) -> None:
