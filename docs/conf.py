@@ -56,6 +56,7 @@ NAVIGATION = {
         "Gloves and their options <docs/gloves>",
         "Add your glove <docs/own-glove>",
         "Two gloves <docs/two-gloves>",
+        "docs/recording-with-others",
         "docs/references",
         "The colour glove <docs/colour-glove>",
         "Train <docs/train>",

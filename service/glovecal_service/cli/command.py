@@ -35,6 +35,7 @@ from glovecal_service.cli.glove import (
     layouts,
     recordings,
     shapes,
+    trigger,
     watch,
 )
 from glovecal_service.cli.job import jobs
@@ -77,6 +78,7 @@ app.command("card", rich_help_panel=GLOVES)(card_session.card)
 app.add_typer(cameras.app, name="camera", rich_help_panel=GLOVES)
 app.add_typer(layouts.app, name="glove", rich_help_panel=GLOVES)
 app.command("record", rich_help_panel=TAKES)(recordings.record)
+app.command("trigger", rich_help_panel=TAKES)(trigger.trigger)
 app.add_typer(samplings.app, name="sample", rich_help_panel=TAKES)
 app.command("shapes", rich_help_panel=TAKES)(shapes.shapes)
 app.add_typer(takes.app, name="take", rich_help_panel=TAKES)

@@ -22,6 +22,7 @@ from glovecal_service.recorder.pre_roll import PreRollRequest
 from glovecal_service.recorder.reconciliation import Outcome
 from glovecal_service.recorder.run_books import OWN_CLOCK
 from glovecal_service.recorder.run_ledger import CAPTURE, SUFFIX, RunLedger
+from glovecal_service.recorder.trigger_times import trigger_facts
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY, PRE_ROLL
 from glovecal_service.store.records import RecordingRecord, TakeRecord
@@ -128,6 +129,7 @@ def keep_as_take(
             source="recording",
             accounting=accounting,
             recording=record.id,
+            facts=trigger_facts(record.facts, recorded.clock),
         )
     elif take.accounting != accounting:
         take = store.takes.repair(take.id, recorded.take, accounting)

@@ -24,6 +24,9 @@ PRE_ROLL_BEFORE = "lead_in"
 """The same in data folders from before 2026-11-22."""
 STOP_ASKED = "stop_asked_s"
 """Fact of a recording: when its end was asked for, Unix seconds of the service's clock."""
+TRIGGER = "trigger"
+"""Fact of a recording that another system's trigger began, and of its take: what the trigger said at its
+``start`` and at its ``stop``, and when it came."""
 ENDED_BY = "ended_by"
 """Fact of a recording whose end nobody asked for: what ended it."""
 PRE_ROLL_S = 60.0
@@ -54,10 +57,12 @@ class Recordings:
         subject: str | None = None,
         wearing: str | None = None,
         lead_s: float = PRE_ROLL_S,
+        trigger: Mapping[str, Any] | None = None,
     ) -> RecordingRecord:
         """Ask for a recording; subject and wearing default to the glove's at this moment.
 
-        ``lead_s`` seconds before it are to be in it too, as far as they were captured. Raises BadInput
+        ``lead_s`` seconds before it are to be in it too, as far as they were captured. ``trigger``: what
+        another system said, that began it. Raises BadInput
         (names, a pre-roll that is negative or longer than ``LONGEST_PRE_ROLL_S``), NotFound (glove never
         seen, unknown subject), Conflict if the glove is being recorded already.
         """
@@ -88,19 +93,33 @@ class Recordings:
                 "subject": subject if subject is not None else worn.subject,
                 "wearing": wearing if wearing is not None else worn.wearing,
                 "state": "requested",
-                "facts": {PRE_ROLL: {"asked_s": lead_s}},
+                "facts": {PRE_ROLL: {"asked_s": lead_s}}
+                | ({} if trigger is None else {TRIGGER: {"start": dict(trigger)}}),
                 "requested_at": at,
                 "updated_at": at,
             }
             add_row(connection, tables.recordings, values)
             return _require(connection, id)
 
-    def stop(self, id: str) -> RecordingRecord:
-        """Ask for the end of a recording; asking again, or after its end, changes nothing."""
+    def stop(
+        self, id: str, *, name: str | None = None, trigger: Mapping[str, Any] | None = None
+    ) -> RecordingRecord:
+        """Ask for the end of a recording; asking again, or after its end, changes nothing.
+
+        ``name``: what it and its take are called from now on; ``trigger``: what another system said, that
+        ended it. Raises NotFound, BadInput.
+        """
+        if name is not None:
+            check_text(name, "name of the recording")
         with self._database.write() as connection:
             grow_revision(connection)
-            asked = {STOP_ASKED: time.time()} if _ORDER[_require(connection, id).state] < _STOPPING else {}
-            return _move(connection, id, "stopping", asked)
+            before = _require(connection, id)
+            if _ORDER[before.state] >= _STOPPING:
+                return before
+            asked: dict[str, Any] = {STOP_ASKED: time.time()}
+            if trigger is not None:
+                asked[TRIGGER] = {**before.facts.get(TRIGGER, {}), "stop": dict(trigger)}
+            return _move(connection, id, "stopping", asked, name)
 
     def update(self, id: str, *, state: RecordingState | None = None, **facts: Any) -> RecordingRecord:
         """Report what became of it: facts are merged, the state only moves forward.
@@ -144,12 +163,14 @@ def with_pre_roll(facts: Mapping[str, Any]) -> dict[str, Any]:
     return {PRE_ROLL if key == PRE_ROLL_BEFORE else key: value for key, value in facts.items()}
 
 
-def _move(connection: Connection, id: str, state: str | None, facts: dict[str, Any]) -> RecordingRecord:
+def _move(
+    connection: Connection, id: str, state: str | None, facts: dict[str, Any], name: str | None = None
+) -> RecordingRecord:
     def change(row: dict[str, Any]) -> dict[str, Any]:
         values: dict[str, Any] = {"facts": {**row["facts"], **facts}, "updated_at": now()}
         if state is not None and _ORDER[state] > _ORDER[row["state"]]:
             values["state"] = state
-        return values
+        return values if name is None else {**values, "name": name}
 
     change_rows(connection, tables.recordings, tables.recordings.c.id == id, change)
     return _require(connection, id)

@@ -14,6 +14,7 @@ from glovecal_models.hand.skeleton import Palm, Skeleton, hand_skeleton
 from glovecal_models.sampling.sampled_takes import is_labelled
 from glovecal_models.takes.session_drift import shape_of
 from glovecal_models.takes.take import KnownLatency, Stretch
+from glovecal_models.takes.time_code import TimeCode
 
 RecordingState = Literal["requested", "recording", "stopping", "repairing", "done", "failed"]
 """``repairing``: it is over and its take can be used, but frames may still come from the capture log."""
@@ -23,6 +24,8 @@ CLOCK_UNKNOWN = "clock_unknown"
 """Fact of a take: a repair of clocks did not find that of its reference."""
 LEFT_OUT = "left_out"
 """Fact of a take: stretches that people left out, in seconds since its first frame, the newest last."""
+TIME_CODE = "time_code"
+"""Fact of a take: ``glovecal_models.takes.time_code.TimeCode``, as a document."""
 
 FINISHED_JOB_STATES: tuple[JobState, ...] = ("done", "failed", "cancelled")
 OPEN_RECORDING_STATES: tuple[RecordingState, ...] = ("requested", "recording", "stopping")
@@ -163,6 +166,12 @@ class TakeRecord:
     def note(self) -> str:
         """What people want to remember of it."""
         return str(self.facts.get(NOTE, ""))
+
+    @property
+    def time_code(self) -> TimeCode | None:
+        """Which SMPTE time code it has at which time; None where none is known."""
+        known = self.facts.get(TIME_CODE)
+        return None if known is None else TimeCode.of_document(known)
 
     @property
     def left_out(self) -> tuple[Stretch, ...]:

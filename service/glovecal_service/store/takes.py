@@ -17,13 +17,14 @@ from glovecal_models.takes.camera_reference import CAMERA_PATCHES
 from glovecal_models.takes.clock_scan import aligned
 from glovecal_models.takes.reference_jumps import without_jumps
 from glovecal_models.takes.take import Stretch, Take, poses_at_frames
+from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.store import tables
 from glovecal_service.store.blobs import Artifacts, check_sha256
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.gloves import latency_of_take
 from glovecal_service.store.list_part import WHOLE, ListPart
-from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, NOTE, TakeRecord
+from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, NOTE, TIME_CODE, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 from glovecal_service.store.take_file import dump_take, frames_hash, load_take
@@ -64,6 +65,7 @@ class Takes:
         original_sha256: str | None = None,
         accounting: Mapping[str, Any] | None = None,
         recording: str | None = None,
+        facts: Mapping[str, Any] | None = None,
     ) -> TakeRecord:
         """Keep one take: ``add_all`` of it alone, with what its recording has to say about it."""
         (record,) = self._keep(
@@ -74,6 +76,7 @@ class Takes:
             original_sha256=original_sha256,
             accounting=None if accounting is None else dict(accounting),
             recording=recording,
+            facts=dict(facts or {}),
         )
         return record
 
@@ -230,6 +233,11 @@ class Takes:
     def describe(self, id: str, *, note: str) -> TakeRecord:
         """What people want to remember of it; "" for nothing. Raises NotFound."""
         return self._with_facts(id, lambda facts: {NOTE: note})
+
+    def note_time_code(self, id: str, time_code: TimeCode | None) -> TakeRecord:
+        """Which SMPTE time code it has; None: none is known. Raises NotFound."""
+        document = None if time_code is None else time_code.document()
+        return self._with_facts(id, lambda facts: {TIME_CODE: document})
 
     def leave_out(self, id: str, stretch: Stretch) -> TakeRecord:
         """Leave frames and reference between two times, seconds since its first frame, out of all work with

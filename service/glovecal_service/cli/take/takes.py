@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from glovecal_client.errors import ServiceError
-from glovecal_service.cli.take import clocks, examination, hands, holds, latency, motion, table_import, video
+from glovecal_service.cli.take import (
+    clocks,
+    examination,
+    hands,
+    holds,
+    latency,
+    motion,
+    table_import,
+    time_code,
+    video,
+)
 from glovecal_service.cli.take.rows import find_take, find_takes, print_takes, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
@@ -38,6 +48,7 @@ app.command("examine")(examination.examine)
 app.command("hands")(hands.hands)
 app.command("holds")(holds.holds)
 app.command("motion")(motion.motion)
+app.command("timecode")(time_code.timecode)
 app.command("video")(video.video)
 
 JUMPS = {
@@ -101,6 +112,7 @@ def _facts(found: CheckView) -> dict[str, Any]:
         **({"pre-roll": f"{found.pre_roll_frames} of them in {pre_roll_s:.2f} s"} if pre_roll_s else {}),
         **({"note": take.note} if take.note else {}),
         **({"left out": _left_out(take)} if take.left_out else {}),
+        **time_code.facts_of(found),
         "state": take.state,
         **({} if sent is None else {"frames sent": sent}),
         "rate (Hz)": found.rate_hz,

@@ -5,9 +5,17 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
+from pydantic import Field, FiniteFloat, StringConstraints
 
-from glovecal_service.request_types import IDENTIFIER, Identifier, StrictBody, SubjectName, WearingName
+from glovecal_models.takes.time_code import FrameRate
+from glovecal_service.request_types import (
+    IDENTIFIER,
+    ONE_LINE,
+    Identifier,
+    StrictBody,
+    SubjectName,
+    WearingName,
+)
 from glovecal_service.rest.glove.answer import Recording
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
@@ -16,6 +24,33 @@ from glovecal_service.store.recordings import LONGEST_PRE_ROLL_S, PRE_ROLL_S
 from glovecal_service.store.records import RecordingRecord
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
+
+
+Sent = Annotated[str, StringConstraints(max_length=500, pattern=ONE_LINE)]
+"""A field of a trigger, as it was sent."""
+
+
+class ReceivedTrigger(StrictBody):
+    """What another system said when it began or ended a recording, and when that came."""
+
+    protocol: Identifier
+    sender: Sent = ""
+    name: Sent = ""
+    notes: Sent = ""
+    description: Sent = ""
+    result: Sent = ""
+    time_code: Sent = Field("", description="As HH:MM:SS:FF; `;` before the frames is drop-frame.")
+    rate: FrameRate | None = Field(
+        None, description="Of the time code, frames a second; null: not known, or 29.97 drop-frame."
+    )
+    delay_s: Annotated[FiniteFloat, Field(ge=0, le=60)] = Field(
+        0.0, description="From its arrival to what it speaks of."
+    )
+    wall_s: FiniteFloat = Field(description="When it came, Unix seconds of the computer it came to.")
+    monotonic_s: FiniteFloat = Field(description="The same by that computer's monotonic clock.")
+    computer: Annotated[str, StringConstraints(max_length=64, pattern=ONE_LINE)] = Field(
+        description="Whose monotonic clock that is."
+    )
 
 
 class NewRecording(StrictBody):
@@ -30,6 +65,12 @@ class NewRecording(StrictBody):
         description="Seconds before the request that are fetched from the capture log, as far as they lie in "
         "the same run and wearing: they tell effects with a memory where they stand.",
     )
+    trigger: ReceivedTrigger | None = Field(None, description="By which another system began it.")
+
+
+class RecordingEnd(StrictBody):
+    name: WearingName | None = Field(None, description="What the take will be called instead.")
+    trigger: ReceivedTrigger | None = Field(None, description="By which another system ended it.")
 
 
 @router.post(
@@ -63,7 +104,7 @@ def get_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
 
 
 @router.post("/{id}/stop", response_model=Recording, summary="Stop a recording", responses=change_problems())
-def stop_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
+def stop_recording(id: IdInPath, store: StoreNeeded, body: RecordingEnd | None = None) -> RecordingRecord:
     """Asking again changes nothing. The take is there once `state` is `done`, or `repairing`: then frames are
     not there yet, and the take is completed, and `done`, once the capture log could be asked for them."""
-    return store.recordings.stop(id)
+    return store.recordings.stop(id, **({} if body is None else body.model_dump()))

@@ -64,8 +64,9 @@ REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
 STUDIO = "studio"
 """The client's name in requests that its pages make, and where they are: looking there again and again
 fills no log."""
-LIVE_PICTURE = f"{PREFIX}/cameras/{{glove}}/picture"
-"""Asked for ten times a second by each page that shows it."""
+OFTEN = (f"{PREFIX}/cameras/{{glove}}/picture", f"{PREFIX}/recordings")
+"""Routes asked for ten times a second: by each page that shows a camera's picture, and by
+``glovecal trigger`` that waits for recordings to begin."""
 log: Any = structlog.wrap_logger(
     logging.getLogger("glovecal.rest"),
     processors=[
@@ -107,8 +108,7 @@ class Observation:
         route = _route(scope)
         self.metrics.answered(scope["method"], route, answer.status, seconds)
         for_a_page = (scope.get("client") or ("",))[0] == STUDIO or scope["path"].startswith(f"/{STUDIO}/")
-        for_a_page = for_a_page or route == LIVE_PICTURE
-        only_looks = for_a_page and scope["method"] == "GET" and answer.status < 400
+        only_looks = (for_a_page or route in OFTEN) and scope["method"] == "GET" and answer.status < 400
         (log.debug if only_looks else log.info)(
             "request",
             request_id=request_id,

@@ -13,6 +13,7 @@ from glovecal_models.takes.camera_estimates import CoveredRange
 from glovecal_models.takes.hand_clocks import How
 from glovecal_models.takes.take import ReferenceJump, Stretch
 from glovecal_models.takes.take_check import RotationRange, SensorRange
+from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.file_kinds import FileKind
 from glovecal_service.plain import Row
@@ -43,6 +44,9 @@ class Take(Row):
         "first frame, the newest last."
     )
     note: str = Field(description="What people want to remember of it.")
+    time_code: TimeCode | None = Field(
+        None, description="SMPTE time code `label` begins at `time_s` of the take's clock; null: not known."
+    )
     simulated: bool
     recording: str | None
     state: Literal["complete", "repairing"] = Field(
@@ -94,6 +98,9 @@ class CheckView(Row):
     )
     pre_roll_frames: int = Field(description="Frames before the take was asked for.")
     pre_roll_s: float
+    time_codes: list[str] = Field(
+        description="SMPTE time code of the first and the last frame asked for; empty where not known."
+    )
     sensors: list[SensorRange]
     rotations: list[RotationRange]
     jumps: list[ReferenceJump] = Field(description="Where the reference jumps while the sensors do not.")

@@ -14,9 +14,10 @@ from starlette.background import BackgroundTask
 
 from glovecal_models.takes.take import Take as TakeArrays
 from glovecal_models.takes.take_check import check_take
+from glovecal_models.takes.time_code import FrameRate, TimeCode
 from glovecal_models.takes.write_table import write_takes
 from glovecal_service.plain import plain, plain_text
-from glovecal_service.request_types import Identifier, StrictBody
+from glovecal_service.request_types import ONE_LINE, Identifier, StrictBody
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.list_part import PartWanted, tell_rest
 from glovecal_service.rest.http.problem import Problem, change_problems, problems, without_damaged
@@ -57,8 +58,10 @@ def get_take(id: IdInPath, store: StoreNeeded) -> TakeRecord:
     responses=problems(),
 )
 def check_one_take(id: IdInPath, store: StoreNeeded) -> CheckView:
-    record = store.takes.get(id)
-    found = plain(asdict(check_take(store.takes.load(id))))
+    record, take = store.takes.get(id), store.takes.load(id)
+    found = plain(asdict(check_take(take)))
+    ends = () if record.time_code is None else (take.time_s[take.pre_roll_frames], take.time_s[-1])
+    found["time_codes"] = [record.time_code.at(float(time_s)) for time_s in ends if record.time_code]
     known = [*incomplete_sentences([record]), *record.facts.get(UNWRAPPED, ())]
     found["sentences"] = [*known, *found["sentences"]]
     return CheckView(take=Take.model_validate(record, from_attributes=True), **found)
@@ -78,6 +81,36 @@ def put_layout(id: IdInPath, body: TakeLayout, store: StoreNeeded) -> TakeRecord
     """Frames and reference stay as they are; models that were trained on the take stay what they are. 422
     when the take lacks a sensor of the layout."""
     return store.takes.use_layout(id, store.layouts.get(body.layout))
+
+
+class TakeTimeCode(StrictBody):
+    time_code: Annotated[str, Field(max_length=40, pattern=ONE_LINE)] = Field(
+        description="HH:MM:SS:FF of a frame; `;` before the frames is drop-frame."
+    )
+    rate: FrameRate | None = Field(None, description="Frames a second; null: 29.97 drop-frame.")
+    at_s: FiniteFloat = Field(description="When that frame begins, seconds since the take's first frame.")
+    source: Annotated[str, Field(max_length=200, pattern=ONE_LINE)] = "entered"
+
+
+@router.put(
+    "/{id}/time-code",
+    response_model=Take,
+    summary="Say which SMPTE time code a take has",
+    responses=change_problems(),
+)
+def put_time_code(id: IdInPath, body: TakeTimeCode, store: StoreNeeded) -> TakeRecord:
+    """Kept by the take's clock, beside its frames."""
+    time_s = float(store.takes.load_recorded(id).time_s[0]) + body.at_s
+    return store.takes.note_time_code(
+        id, TimeCode.of_text(body.time_code, body.rate, time_s, plain_text(body.source))
+    )
+
+
+@router.delete(
+    "/{id}/time-code", response_model=Take, summary="Forget a take's time code", responses=change_problems()
+)
+def remove_time_code(id: IdInPath, store: StoreNeeded) -> TakeRecord:
+    return store.takes.note_time_code(id, None)
 
 
 class TakeNote(StrictBody):

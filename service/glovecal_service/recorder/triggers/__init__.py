@@ -1,0 +1,1 @@
+"""Triggers: recordings that begin and end with those of other systems, in either direction, over UDP."""
