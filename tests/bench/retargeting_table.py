@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "models" / "retarge
 from rigs import CONVENTIONS, rig_like
 
 from glovecal_models.hand.retargeting.retarget import Retargeting
-from glovecal_models.hand.retargeting.touches import NEAR_MM, Touches
+from glovecal_models.hand.retargeting.touches import TOUCHING_MM, Touches
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS
 from glovecal_models.hand.skeleton import hand_skeleton
 
@@ -44,12 +44,12 @@ def main() -> int:
                 return np.linalg.norm(np.delete(tips - tips[:, [thumb]], thumb, axis=1), axis=2)
 
             own = touches.own_joints_mm(drawn)
-            near = np.flatnonzero((gaps(own) < NEAR_MM).any(axis=1))[:POSES]
+            near = np.flatnonzero((gaps(own) < TOUCHING_MM).any(axis=1))[:POSES]
             free = np.arange(POSES)
             shown = touches.joints(touches.orientations(drawn[free])) / touches.units_a_mm
             away.append(np.linalg.norm(own[free, :, -1] - shown[:, :, -1], axis=2).reshape(-1))
             turned = (touches.retargeting.orientations(drawn[near]), touches.orientations(drawn[near]))
-            closed = gaps(own[near]) < NEAR_MM
+            closed = gaps(own[near]) < TOUCHING_MM
             counts[0] += len(near)
             for place, orientations in enumerate(turned, 1):
                 other = gaps(touches.joints(orientations) / touches.units_a_mm)

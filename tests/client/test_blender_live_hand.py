@@ -32,7 +32,7 @@ def live_hand() -> ModuleType:
 
 
 def test_turns_are_read_as_quaternions_whatever_they_are(live_hand: ModuleType) -> None:
-    random = Rotation.random(500, rng=4)
+    random = Rotation.random(500, rng=np.random.default_rng(4))
     half_turns = Rotation.from_rotvec(np.pi * np.concatenate([np.eye(3), -np.eye(3)]))
     whole = Rotation.concatenate([random, half_turns, Rotation.identity(1)])
     given = live_hand.quaternions(whole.as_matrix())

@@ -120,7 +120,7 @@ class LiveHand:
             return
         usable = pose.usable
         rotations = tuple(str(name) for name in meta["rotations"])
-        angles = self._held.angles_deg(self.skeleton, rotations, pose.degrees, usable)
+        angles = np.array([self._held.degrees(self.skeleton, rotations, pose.degrees, usable)])
         made = touches.retargeting
         turns = made.from_rest(made.against_parents(touches.orientations(angles)))[0]
         self.latest = latest = BoneTurns(

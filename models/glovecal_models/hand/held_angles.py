@@ -17,11 +17,15 @@ class HeldAngles:
     def __init__(self) -> None:
         self._last: dict[str, float] = {}
 
-    def angles_deg(
+    def degrees(
         self, skeleton: Skeleton, rotations: Sequence[str], degrees: np.ndarray, usable: np.ndarray
-    ) -> np.ndarray:
-        """(1, R) in the order of the skeleton's rotations, of the next pose: ``degrees`` (K,) and ``usable``
-        (K,) bool of ``rotations``."""
+    ) -> list[float]:
+        """Of the next pose, in the order of the skeleton's rotations: ``degrees`` (K,) and ``usable`` (K,)
+        bool of ``rotations``."""
         given = zip(rotations, degrees.tolist(), usable.tolist(), strict=True)
         self._last |= {name: angle for name, angle, is_usable in given if is_usable}
-        return completed(list(self._last), np.array([list(self._last.values())]), skeleton.rotations)
+        try:
+            return [self._last[name] for name in skeleton.rotations]
+        except KeyError:
+            known = np.array([list(self._last.values())])
+            return completed(list(self._last), known, skeleton.rotations)[0].tolist()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from glovecal_client.wire.pose import Pose, RotationFlag
+from glovecal_client.wire.pose import Pose
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HandBones
-from glovecal_models.hand.rotations import Handedness, completed, known_hand
+from glovecal_models.hand.held_angles import HeldAngles
+from glovecal_models.hand.rotations import Handedness, known_hand
 from glovecal_models.hand.skeleton import Quaternion, Skeleton, skeleton_from_document
 from glovecal_service.bridges.bone_turns import BoneTurns
 
@@ -21,7 +21,6 @@ NO_HAND = (
     "nobody said which hand it is on, so its bones are not known; say so: "
     "glovecal subject measure {subject} --hand right"
 )
-UNUSABLE = RotationFlag.TOO_UNCERTAIN | RotationFlag.FAULTY_SENSOR
 
 
 class PoseMeaning:
@@ -59,11 +58,6 @@ class GlovePose:
     def state(self) -> PoseState:
         return "stale" if self.pose.stale else "uncalibrated" if self.pose.uncalibrated else "live"
 
-    @cached_property
-    def usable(self) -> np.ndarray:
-        """(R,) bool: neither too uncertain nor held because a sensor fails."""
-        return (self.pose.rotation_flags & UNUSABLE) == 0
-
     @property
     def radians(self) -> dict[str, float]:
         """The usable angles by rotation."""
@@ -71,7 +65,7 @@ class GlovePose:
         return {
             name: angle
             for name, angle, is_usable in zip(
-                self.meaning.rotations, angles, self.usable.tolist(), strict=True
+                self.meaning.rotations, angles, self.pose.usable.tolist(), strict=True
             )
             if is_usable
         }
@@ -84,28 +78,19 @@ class BonesInMotion:
     """
 
     def __init__(self) -> None:
-        self._last: dict[str, float] = {}
+        self._held = HeldAngles()
         self._model: str | None = None
         self._turns: BoneTurns | None = None
 
     def turned(self, hand: GlovePose) -> tuple[HandBones, list[Quaternion]] | None:
         """The bones, and how each is turned in its parent's frame; None where it is not known which hand the
         glove is on."""
-        skeleton = hand.meaning.skeleton
+        skeleton, pose = hand.meaning.skeleton, hand.pose
         if skeleton is None:
             return None
         if self._turns is None or self._turns.bones.skeleton is not skeleton:
             self._turns = BoneTurns(HandBones.of(skeleton))
-        if hand.pose.model_sha256 != self._model:
-            self._last, self._model = {}, hand.pose.model_sha256
-        usable = zip(hand.meaning.rotations, hand.pose.degrees.tolist(), hand.usable.tolist(), strict=True)
-        self._last |= {name: degrees for name, degrees, is_usable in usable if is_usable}
-        return self._turns.bones, self._turns.local(self._degrees(skeleton))
-
-    def _degrees(self, skeleton: Skeleton) -> list[float]:
-        """In the order of the skeleton's rotations."""
-        try:
-            return [self._last[name] for name in skeleton.rotations]
-        except KeyError:
-            known = np.array([list(self._last.values())])
-            return completed(list(self._last), known, skeleton.rotations)[0].tolist()
+        if pose.model_sha256 != self._model:
+            self._held, self._model = HeldAngles(), pose.model_sha256
+        degrees = self._held.degrees(skeleton, hand.meaning.rotations, pose.degrees, pose.usable)
+        return self._turns.bones, self._turns.local(degrees)

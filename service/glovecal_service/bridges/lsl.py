@@ -114,7 +114,7 @@ class _Stream:
         row = np.full(2 * count + 1, np.nan, np.float32)
         time_s = pylsl.local_clock()
         if hand.state == "live":
-            row[:count] = np.where(hand.usable, hand.pose.degrees, np.nan)
+            row[:count] = np.where(hand.pose.usable, hand.pose.degrees, np.nan)
             row[count:-1] = hand.pose.deviations
             time_s = self._ahead_s + _time_of_hand_s(hand)
         row[-1] = hand.pose.flags

@@ -54,7 +54,7 @@ class VmcBridge(Bridge):
             return
         motion = self._motions.setdefault(hand.glove, BonesInMotion())
         moved = motion.turned(hand) if hand.state == "live" else None
-        self._is_sound[hand.glove] = moved is not None and bool(hand.usable.all())
+        self._is_sound[hand.glove] = moved is not None and bool(hand.pose.usable.all())
         tracking = int(all(self._is_sound.values()))
         messages = [_message("/VMC/Ext/OK", "iiii", _LOADED, _CALIBRATED, _NORMAL_MODE, tracking)]
         if moved is not None:

@@ -28,7 +28,8 @@ from glovecal_service.bridges.glove_pose import GlovePose, PoseMeaning
 from glovecal_service.bridges.traffic import Traffic
 
 if TYPE_CHECKING:
-    from websockets.asyncio.server import ServerConnection
+    import numpy as np
+from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
     from websockets.typing import Origin
 
@@ -174,7 +175,9 @@ class _Messages:
             "age_ms": pose.age_us / 1e3,
             "degrees": dict(zip(names, degrees, strict=True)),
             "sd_deg": dict(zip(names, sd_deg, strict=True)),
-            "unusable": [name for name, is_usable in zip(names, hand.usable, strict=True) if not is_usable],
+            "unusable": [
+                name for name, is_usable in zip(names, hand.pose.usable, strict=True) if not is_usable
+            ],
         }
         return json.dumps(document)
 

@@ -33,7 +33,8 @@ from glovecal_service.exports.gltf import (
 from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 
 LARGEST_JSON = 64_000_000
-MOST_NODES = 20_000
+MOST_LISTED = 20_000
+"""Nodes of a scene."""
 DEEPEST = 500
 RIGHT = "is it a binary glTF 2.0 file (.glb)? Export the character again"
 
@@ -69,11 +70,11 @@ class Character:
     @cached_property
     def rig(self) -> Rig:
         """Nodes in the pose that the file gives them. Raises BadInput for nodes that are no tree."""
-        nodes = self.document.get("nodes")
-        if not isinstance(nodes, list) or not 0 < len(nodes) <= MOST_NODES:
-            raise BadInput(f"the character has no nodes, or more than {MOST_NODES}; {RIGHT}")
+        listed = self.document.get("nodes")
+        if not isinstance(listed, list) or not 0 < len(listed) <= MOST_LISTED:
+            raise BadInput(f"the character has no nodes, or more than {MOST_LISTED}; {RIGHT}")
         try:
-            return Rig(tuple(self._bones(nodes)))
+            return Rig(tuple(self._bones(listed)))
         except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
             raise BadInput(f"the character's nodes are not as glTF has them; {RIGHT}") from error
 
@@ -88,16 +89,16 @@ class Character:
             taken.add(names[-1])
         return tuple(names)
 
-    def _bones(self, nodes: Sequence[Any]) -> Iterator[RigBone]:
-        parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", ())}
-        waiting = [(number, 0, np.eye(4)) for number in range(len(nodes)) if number not in parents]
+    def _bones(self, listed: Sequence[Any]) -> Iterator[RigBone]:
+        parents = {child: number for number, node in enumerate(listed) for child in node.get("children", ())}
+        waiting = [(number, 0, np.eye(4)) for number in range(len(listed)) if number not in parents]
         seen = 0
         while waiting:
             number, depth, above = waiting.pop()
             seen += 1
-            if depth > DEEPEST or seen > len(nodes):
+            if depth > DEEPEST or seen > len(listed):
                 raise ValueError("no tree")
-            own = above @ _matrix(nodes[number])
+            own = above @ _matrix(listed[number])
             axes = own[:3, :3] / np.linalg.norm(own[:3, :3], axis=0)
             if not np.isfinite(own).all() or abs(np.linalg.det(axes)) < 0.5:
                 raise ValueError("no turn")
@@ -105,7 +106,7 @@ class Character:
             yield RigBone(
                 self.names[number], None if parent is None else self.names[parent], tuple(own[:3, 3]), axes
             )
-            waiting += [(child, depth + 1, own) for child in nodes[number].get("children", ())]
+            waiting += [(child, depth + 1, own) for child in listed[number].get("children", ())]
 
     def write(self, motions: Sequence[HandMotion], content: Content, path: Path) -> None:
         """Hands on one time, as an animation more. Raises BadInput where a hand is not found."""

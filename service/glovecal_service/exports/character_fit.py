@@ -8,7 +8,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.retargeting.retarget import Retargeting
-from glovecal_models.hand.retargeting.touches import NEAR_MM, Touches
+from glovecal_models.hand.retargeting.touches import TOUCHING_MM, Touches
 from glovecal_service.exports.body_motion import whole_angles
 from glovecal_service.exports.character import Character
 from glovecal_service.exports.hand_motion import HandMotion
@@ -74,7 +74,7 @@ def _touched(touches: Touches, own: np.ndarray, shown: np.ndarray) -> tuple[np.n
         np.linalg.norm(np.delete(each[:, :, -1] - each[:, [thumb], -1], thumb, axis=1), axis=2)
         for each in (own, shown)
     )
-    near = gaps < NEAR_MM
+    near = gaps < TOUCHING_MM
     lost = near & (others > gaps + LOST_MM)
     return near.any(axis=1), lost.any(axis=1), int(gaps.min(axis=1).argmin())
 

@@ -19,9 +19,10 @@ from glovecal_models.hand.bones import HAND, METACARPAL, PHALANGES, HandBones
 from glovecal_models.hand.retargeting.rig import Rig, hand_of
 from glovecal_models.hand.rotations import VIRTUAL_SHARES
 from glovecal_models.hand.skeleton import Skeleton
+from glovecal_models.names import did_you_mean
 
 _THUMB = f"thumb_{METACARPAL}"
-SHORTEST_BACK = 0.3
+LEAST_BACK = 0.3
 """Of the back of the hand seen across a finger: below, the finger points out of the palm, and its back is on
 the side of its tip."""
 THUMB_SEARCHED_DEG = 91
@@ -51,7 +52,7 @@ class Retargeting:
         bones = HandBones.of(skeleton)
         for own, other in mapping.items():
             if own not in bones.names:
-                raise BadInput(f"a hand has no bone {own!r}; it has {', '.join(bones.names)}")
+                raise BadInput(f"a hand has no bone {own!r}; {did_you_mean(own, bones.names)}")
             if other not in rig.by_name:
                 raise BadInput(f"the rig has no bone {other!r}, which is to be {own}")
         palm = _palm(rig, mapping, skeleton.hand == "left")
@@ -163,7 +164,7 @@ def _segment_at_rest(
         straight = palm @ _thumb_towards(bones, palm.T @ _first(rig, mapping, along))[name]
         return _swung(straight, along)
     back = palm[:, 2] - along * (along @ palm[:, 2])
-    if np.linalg.norm(back) < SHORTEST_BACK:
+    if np.linalg.norm(back) < LEAST_BACK:
         back = -palm[:, 0] + along * (along @ palm[:, 0])
     back = _unit(back, f"of {name}'s back")
     return np.column_stack([along, np.cross(back, along), back])

@@ -15,7 +15,7 @@ import numpy as np
 from glovecal_models.hand.bones import HAND, PHALANGES
 from glovecal_models.hand.retargeting.retarget import Retargeting, direction
 
-FAR_MM, NEAR_MM = 35.0, 12.0
+FAR_MM, TOUCHING_MM = 35.0, 12.0
 """Between the hand's own fingertips: from where on joints are turned further, and where all of it is done."""
 DAMPING = 0.015
 """Of joints that turn further, in lengths of the rig's hand a radian."""
@@ -56,7 +56,7 @@ class Touches:
         thumb = list(self.chains).index("thumb")
         gaps = np.delete(tips - tips[:, [thumb]], thumb, axis=1)
         distance = np.linalg.norm(gaps, axis=2)
-        weights = np.clip((FAR_MM - distance) / (FAR_MM - NEAR_MM), 0.0, 1.0)
+        weights = np.clip((FAR_MM - distance) / (FAR_MM - TOUCHING_MM), 0.0, 1.0)
         near = weights.any(axis=1)
         if near.any():
             wanted = self.units_a_mm * gaps[near] @ self.retargeting.palm.T
