@@ -64,8 +64,9 @@ def test_json_says_all_of_both_hands_and_stale_never_looks_live(stage: Stage) ->
         with connect(f"ws://{host}:{port}/left") as only:
             for _ in range(10):
                 assert json.loads(only.recv(timeout=120))["glove"] == "left"
-        counts = eventually(lambda: bridge.counts("right"), "a line of counts")
-        assert counts["lost"] == counts["slow_receiver"] == 0
+        counts = eventually(lambda: bridge.counts("left"), "a line of counts")
+        taken = counts["received"] - counts["overtaken"]
+        assert 0 < counts["sent"] <= 2 * taken, "for one receiver, later two"
         summary = bridge.end()
     assert summary["gloves"]["right"]["reconnects"] == 1
     assert summary["gloves"]["left"]["sent"] > 0
