@@ -17,10 +17,6 @@ from glovecal_models.hand.skeleton import Quaternion, Skeleton, skeleton_from_do
 from glovecal_service.bridges.bone_turns import BoneTurns
 
 PoseState = Literal["live", "stale", "uncalibrated"]
-NO_HAND = (
-    "nobody said which hand it is on, so its bones are not known; say so: "
-    "glovecal subject measure {subject} --hand right"
-)
 
 
 class PoseMeaning:
@@ -36,7 +32,11 @@ class PoseMeaning:
         """Why the bones are not known, a sentence."""
         if document.get("skeleton") is None:
             if self.rotations:
-                self.problem = NO_HAND.format(subject=document.get("subject") or "SUBJECT")
+                subject = document.get("subject") or "SUBJECT"
+                self.problem = (
+                    "nobody said which hand it is on, so its bones are not known; say so: "
+                    f"glovecal subject measure {subject} --hand right"
+                )
         else:
             try:
                 self.skeleton = skeleton_from_document(document["skeleton"])
