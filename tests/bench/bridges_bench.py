@@ -92,7 +92,7 @@ def measure(bridge: str, seconds: float, kills: int) -> dict[str, Any]:
         "lost": sum(
             after["gloves"][glove][what] - before["gloves"][glove][what]
             for glove in gloves
-            for what in ("lost", "overtaken", "slow_receiver")
+            for what in ("lost", "overtaken", "left_out")
         ),
         "added_ms": summary["added_ms"],
         "finger_to_wire_ms": summary["finger_to_wire_ms"],

@@ -43,7 +43,7 @@ class GloveTraffic:
             "lost": counts.lost + counts.damaged,
             "overtaken": max(0, counts.received - self.taken),
             "sent": self.departed,
-            "slow_receiver": self.left_out,
+            "left_out": self.left_out,
             "reconnects": self.reconnects,
         }
 

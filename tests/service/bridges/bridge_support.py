@@ -39,7 +39,7 @@ class WornHand:
         self.hand: Handedness = hand
         self.keys = GloveKeys(SITE, glove)
         self.skeleton = hand_skeleton(SIZES, hand)
-        self.rotations = HAND_ROTATIONS
+        self.rotations, self.is_hand_known = HAND_ROTATIONS, True
         self.model: str | None = ("aa" if hand == "left" else "bb") * 32
         self.run_id, self.sequence = 7 if hand == "left" else 8, 0
         self._session, self._lock = session, threading.Lock()
@@ -56,8 +56,8 @@ class WornHand:
             "state": "calibrated" if calibrated else "uncalibrated",
             "model": self.model,
             "rotations": list(self.rotations) if calibrated else [],
-            "hand": self.hand,
-            "skeleton": skeleton_document(self.skeleton),
+            "hand": self.hand if self.is_hand_known else "unknown",
+            "skeleton": skeleton_document(self.skeleton) if self.is_hand_known else None,
         }
 
     @property

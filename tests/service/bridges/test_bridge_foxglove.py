@@ -123,7 +123,7 @@ def test_frames_joints_and_state_of_both_hands(stage: Stage) -> None:
                 return reader.next_of("/glovecal/right/state")[1]["state"]
 
             eventually(lambda: state_now() == "stale", "the state says so")
-            assert bridge.counts("left")["slow_receiver"] == 0
+            assert bridge.counts("left")["left_out"] == 0
 
 
 def test_a_port_in_use_is_told(stage: Stage) -> None:

@@ -125,7 +125,17 @@ def test_uncertain_fingers_keep_still_and_stale_hands_send_no_bones(stage: Stage
         silent = eventually(lambda: each if not (each := read(receive()))["bones"] else None, "no bones")
         assert silent["/VMC/Ext/OK"] == [1, 3, 0, 0]
         summary = bridge.end()
-    assert summary["gloves"]["right"]["slow_receiver"] == 0
+    assert summary["gloves"]["right"]["left_out"] == 0
+
+
+def test_a_glove_of_an_unknown_hand_shows_no_bones_and_says_what_to_do(stage: Stage) -> None:
+    stage.right.is_hand_known = False
+    stage.show(right={"angles": FIST})
+    with datagrams() as (address, receive), running_bridge(stage, "vmc", "--to", address) as bridge:
+        found = read(receive())
+        assert (found["bones"], found["/VMC/Ext/OK"]) == ({}, [1, 3, 0, 0])
+        assert "say so: glovecal subject measure SUBJECT --hand right" in bridge.complaints
+        assert bridge.end()["gloves"]["right"]["left_out"] > 0
 
 
 def test_an_address_that_is_none_is_refused(stage: Stage) -> None:

@@ -116,7 +116,7 @@ def test_a_receiver_that_does_not_read_gets_the_newest_and_holds_up_nobody(stage
                 reading.recv(timeout=120)
                 for _ in range(50):
                     stage.right.put(FIST)
-                return bool(bridge.counts("right").get("slow_receiver"))
+                return bool(bridge.counts("right").get("left_out"))
 
             eventually(is_left_out, "poses are left out for the one that does not read")
             stage.show(right={"angles": FLAT})

@@ -145,5 +145,5 @@ def _of_glove(name: str, counts: dict[str, Any]) -> str:
     lost = counts["lost"] + counts["overtaken"]
     return (
         f"{name} {rate}, {state}, sent {counts['sent']}, lost {lost}, "
-        f"left out for slow receivers {counts['slow_receiver']}, reconnects {counts['reconnects']}"
+        f"left out {counts['left_out']}, reconnects {counts['reconnects']}"
     )
