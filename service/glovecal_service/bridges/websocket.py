@@ -28,8 +28,7 @@ from glovecal_service.bridges.glove_pose import GlovePose, PoseMeaning
 from glovecal_service.bridges.traffic import Traffic
 
 if TYPE_CHECKING:
-    import numpy as np
-from websockets.asyncio.server import ServerConnection
+    from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
     from websockets.typing import Origin
 
