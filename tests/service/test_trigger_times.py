@@ -24,7 +24,8 @@ def test_a_recording_without_triggers_has_no_such_facts() -> None:
 
 
 def test_on_the_capture_computer_its_clock_counts_elsewhere_the_time_of_day() -> None:
-    facts = trigger_facts()
+    elsewhere = trigger(computer="there", wall_s=1_000_530.0)
+    facts = trigger_facts({"trigger": {"start": trigger(delay_s=0.5), "stop": elsewhere}}, CLOCK)
     start, stop = facts["trigger"]["start"], facts["trigger"]["stop"]
     assert (start["time_s"], start["clock"]) == (500.5, "monotonic")
     assert (stop["time_s"], stop["clock"]) == (530.0, "wall")
