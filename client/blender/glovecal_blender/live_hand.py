@@ -17,8 +17,8 @@ from glovecal_client.errors import NoAnswer
 from glovecal_client.wire.pose import Pose
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HandBones
-from glovecal_models.hand.held_angles import HeldAngles
 from glovecal_models.hand.retargeting.touches import Touches
+from glovecal_models.hand.rotations import HeldAngles
 from glovecal_models.hand.skeleton import Skeleton, skeleton_from_document
 
 MOST_RECORDED = 1_000_000
@@ -120,7 +120,7 @@ class LiveHand:
             return
         usable = pose.usable
         rotations = tuple(str(name) for name in meta["rotations"])
-        angles = np.array([self._held.degrees(self.skeleton, rotations, pose.degrees, usable)])
+        angles = np.array([self._held.degrees(self.skeleton.rotations, rotations, pose.degrees, usable)])
         made = touches.retargeting
         turns = made.from_rest(made.against_parents(touches.orientations(angles)))[0]
         self.latest = latest = BoneTurns(

@@ -108,6 +108,27 @@ def completed(
     return np.column_stack([ruled[name] for name in wanted])
 
 
+class HeldAngles:
+    """Angles of a whole hand from poses that come one by one. An angle that cannot be used keeps its last
+    usable value; what was never usable follows a rule, or rests."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, float] = {}
+
+    def degrees(
+        self, wanted: Sequence[str], rotations: Sequence[str], degrees: np.ndarray, usable: np.ndarray
+    ) -> list[float]:
+        """Of the next pose, in the order of ``wanted``: ``degrees`` (K,) and ``usable`` (K,) bool of
+        ``rotations``."""
+        given = zip(rotations, degrees.tolist(), usable.tolist(), strict=True)
+        self._last |= {name: angle for name, angle, is_usable in given if is_usable}
+        try:
+            return [self._last[name] for name in wanted]
+        except KeyError:
+            known = np.array([list(self._last.values())])
+            return completed(list(self._last), known, wanted)[0].tolist()
+
+
 def known_hand(said: Any) -> Handedness | None:
     """The hand that somebody named; None for anything else."""
     return next((hand for hand in HANDS if hand == said), None)

@@ -11,8 +11,7 @@ import numpy as np
 from glovecal_client.wire.pose import Pose
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HandBones
-from glovecal_models.hand.held_angles import HeldAngles
-from glovecal_models.hand.rotations import Handedness, known_hand
+from glovecal_models.hand.rotations import Handedness, HeldAngles, known_hand
 from glovecal_models.hand.skeleton import Quaternion, Skeleton, skeleton_from_document
 from glovecal_service.bridges.bone_turns import BoneTurns
 
@@ -92,5 +91,5 @@ class BonesInMotion:
             self._turns = BoneTurns(HandBones.of(skeleton))
         if pose.model_sha256 != self._model:
             self._held, self._model = HeldAngles(), pose.model_sha256
-        degrees = self._held.degrees(skeleton, hand.meaning.rotations, pose.degrees, pose.usable)
+        degrees = self._held.degrees(skeleton.rotations, hand.meaning.rotations, pose.degrees, pose.usable)
         return self._turns.bones, self._turns.local(degrees)

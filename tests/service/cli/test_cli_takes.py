@@ -364,4 +364,4 @@ def test_a_take_becomes_a_motion_file(anna: Run, tmp_path: Path) -> None:
     assert again.simulated
     assert np.array_equal(again.readings, exported.readings)
     assert "no model of anna" in anna("take", "motion", tmp_path / "a.trc", take).said
-    assert "must end in .trc" in anna("take", "motion", tmp_path / "a.fbx", take).said
+    assert "must end in .trc" in anna("take", "motion", tmp_path / "a.stl", take).said

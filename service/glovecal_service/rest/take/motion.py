@@ -24,7 +24,7 @@ from glovecal_service.exports.resampling import Resampling
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
-from glovecal_service.rest.http.problem import change_problems
+from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.take.answer import CharacterHand, MotionFormat
 from glovecal_service.store.errors import Conflict, NotFound
 
@@ -104,7 +104,7 @@ class Motion(StrictBody):
     )
 
 
-@router.get("", summary="Formats of motion files")
+@router.get("", summary="Formats of motion files", responses=problems())
 def list_formats() -> list[MotionFormat]:
     """What each holds, and how: units, axes, times, standard deviations."""
     return [
