@@ -21,6 +21,7 @@ from glovecal_models.hand.rotations import PALM, Handedness
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
 from glovecal_service.exports.character import Character
 from glovecal_service.exports.character_fit import CharacterFit
@@ -94,6 +95,7 @@ class HandTake:
     measured: bool
     """The take's own reference angles are wanted."""
     accounting: Mapping[str, Any] | None
+    time_code: TimeCode | None = None
 
     @property
     def label(self) -> str:
@@ -105,10 +107,18 @@ class HandTake:
         notes = {"take": self.take.name, "hand": self.hand, "model": self.model, "measured": self.measured}
         if self.measured:
             palm = "arching" if PALM in self.take.rotations else "rigid"
-            skeleton = self.subject.skeleton(self.hand, palm)
-            return replace(measured_motion(self.take, skeleton, self.label), notes=notes)
+            found = measured_motion(self.take, self.subject.skeleton(self.hand, palm), self.label)
+            return replace(found, notes=notes | self._labelled(found))
         skeleton = self.subject.skeleton(self.hand, "arching" if arches else "rigid")
-        return replace(motion_of(self.take, model, skeleton, self.label), notes=notes)
+        found = motion_of(self.take, model, skeleton, self.label)
+        return replace(found, notes=notes | self._labelled(found))
+
+    def _labelled(self, motion: HandMotion) -> dict[str, str]:
+        """The time code of the first frame."""
+        if self.time_code is None or not len(motion.time_s):
+            return {}
+        label = self.time_code.at(float(motion.time_s[0]))
+        return {"time_code": label, "time_code_rate": self.time_code.counting.named}
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pygltflib
 import pytest
 import trc
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "exports"))
+
+from characters import write_character
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_service.exports.marker_tables import trc_text
@@ -82,6 +89,65 @@ def test_what_cannot_be_written_is_said(client: RestClient, changed: dict, statu
     with pytest.raises(Refused, match=why) as refused:
         client.made("/motion", {"takes": takes(client), "content": "raw", **changed})
     assert refused.value.status == status
+
+
+def test_measured_angles_need_no_model_and_may_have_another_rate(client: RestClient, tmp_path: Path) -> None:
+    [right, _] = takes(client)
+    body = {"takes": [right], "content": "angles", "measured": True}
+    measured = read(client.made("/motion", body), tmp_path)
+    slower = read(client.made("/motion", body | {"rate_hz": 50.0}), tmp_path)
+    assert slower["NumFrames"] == measured["NumFrames"] // 2
+    every = np.array(measured["R_index"])[::2, 1]
+    np.testing.assert_allclose(np.array(slower["R_index"])[:, 1], every, atol=1e-9)
+    smooth = read(client.made("/motion", body | {"low_pass_hz": 5.0}), tmp_path)
+    roughness = [np.abs(np.diff(np.array(each["R_index"])[:, 1], 2)).sum() for each in (measured, smooth)]
+    assert roughness[1] < 0.5 * roughness[0]
+    with pytest.raises(Refused, match=r"30 Hz is too high for 50 frames a second; give at most 22.5 Hz"):
+        client.made("/motion", body | {"rate_hz": 50.0, "low_pass_hz": 30.0})
+
+
+def test_a_files_notes_tell_take_model_and_time_code(client: RestClient, tmp_path: Path) -> None:
+    [right, _] = takes(client)
+    client.put(f"/takes/{right}/time-code", {"time_code": "10:00:00:00", "rate": "25", "at_s": 0.0})
+    body = {"takes": [right], "measured": True, "format": "glb", "rate_hz": 25.0}
+    (tmp_path / "a.glb").write_bytes(client.made("/motion", body))
+    document: Any = pygltflib.GLTF2.load_binary(str(tmp_path / "a.glb"))
+    notes = document.asset.extras["right"]
+    assert notes["take"] == "anna"
+    assert notes["measured"]
+    assert notes["model"] is None
+    assert (notes["time_code"], notes["time_code_rate"], notes["rate_hz"]) == ("10:00:00:00", "25", 25.0)
+
+
+def test_a_character_is_told_of_and_moved(client: RestClient, tmp_path: Path) -> None:
+    [right, _] = takes(client)
+    write_character(tmp_path / "hero.glb", "unreal")
+    body = {"takes": [right], "measured": True, "format": "glb"}
+    with pytest.raises(Refused, match="no character is named") as refused:
+        client.post("/motion/character", body)
+    assert refused.value.status == 422
+    with pytest.raises(Refused, match=r"no upload 0{12}; send the character's .glb") as refused:
+        client.post("/motion/character", body | {"onto": "0" * 64})
+    assert refused.value.status == 404
+    body |= {"onto": client.upload(tmp_path / "hero.glb")}
+    [fit] = client.post("/motion/character", body)
+    assert fit["bones"]["index_proximal"] == "index_01_r"
+    assert fit["hand"] == "right"
+    (tmp_path / "moved.glb").write_bytes(client.made("/motion", body))
+    document: Any = pygltflib.GLTF2.load_binary(str(tmp_path / "moved.glb"))
+    moved = {document.nodes[channel.target.node].name for channel in document.animations[0].channels}
+    assert "index_01_r" in moved
+    with pytest.raises(Refused, match=r"a character moves in a \.glb file, not in \.fbx"):
+        client.made("/motion", body | {"format": "fbx"})
+    other = client.upload(write_nothing(tmp_path))
+    with pytest.raises(Refused, match="does not begin as glTF does"):
+        client.post("/motion/character", body | {"onto": other})
+
+
+def write_nothing(folder: Path) -> Path:
+    path = folder / "no.glb"
+    path.write_text("this is no character")
+    return path
 
 
 def test_two_takes_of_one_hand_are_no_pair(client: RestClient) -> None:

@@ -238,5 +238,12 @@ def _hand(parts: Parts, body: Motion, take: str, model: str | None, hand: Handed
         )
     recorded, measured = parts.store.takes.load_recorded(record.id), body.measured and body.content != "raw"
     return HandTake(
-        recorded, subject, side, artifact, chosen.id if chosen else None, measured, record.accounting
+        recorded,
+        subject,
+        side,
+        artifact,
+        chosen.id if chosen else None,
+        measured,
+        record.accounting,
+        record.time_code,
     )
