@@ -15,6 +15,8 @@ from glovecal_service.bridges.ros2 import joint_state
 from glovecal_service.exports.body_motion import SIDES
 from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion
 
+CHUNK_BYTES = 1 << 15
+"""That are held until they are written."""
 TYPE = "sensor_msgs/msg/JointState"
 _BETWEEN = "=" * 80
 DEFINITION = f"""std_msgs/Header header
@@ -40,7 +42,7 @@ def write_mcap(motions: Sequence[HandMotion], content: Content, path: Path) -> N
     for motion in motions:
         motion.require_angles(content)
     with path.open("wb") as stream:
-        writer = Writer(stream)
+        writer = Writer(stream, chunk_size=CHUNK_BYTES)
         writer.start(profile="ros2", library="glovecal")
         schema = writer.register_schema(TYPE, "ros2msg", DEFINITION.encode())
         channels = []

@@ -43,10 +43,11 @@ def moving(frames: int) -> HandMotion:
     )
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", [suffix for suffix in FORMATS if suffix != ".c3d"])
 def test_ten_times_as_many_frames_need_no_more_memory(
     suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """But for C3D: the library that writes it holds a file whole, of 65,535 frames at most."""
     monkeypatch.setattr(hand_motion, "FRAMES_AT_ONCE", 100, raising=False)
     path = tmp_path / f"motion{suffix}"
     FORMATS[suffix].write([moving(100)], "joints", path)  # loads what it needs

@@ -16,12 +16,15 @@ from glovecal_service.cli.take.rows import stored_takes
 from glovecal_service.cli.terminal.connection import connect, stored_models
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
 from glovecal_service.cli.terminal.printing import (
+    Overwrite,
     Refusal,
     out,
     print_facts,
     print_table,
     read_or_print,
+    require_place,
     text,
+    write_whole,
 )
 from glovecal_service.plain import read
 from glovecal_service.rest.subject.answer import HistoryView, SkeletonView
@@ -129,6 +132,27 @@ def skeleton(
     sizes, measured = found.dimensions.sizes, found.dimensions.measured
     rows = [{"name": key, "mm": f"{mm:.1f}", "from": _origin(key, measured)} for key, mm in sizes.items()]
     print_table(rows, {"name": f"{found.hand} hand", "mm": "mm", "from": ""}, empty="")
+
+
+@app.command("robot")
+def robot(
+    name: Name,
+    file: Annotated[Path, typer.Argument(help="Where to write; .urdf for ROS, .xml for MuJoCo (MJCF).")],
+    hand: Hand = None,
+    palm: Annotated[
+        Palm, typer.Option(help="arching: with the joint of the little finger's metacarpal.")
+    ] = "rigid",
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a subject's hand for robotics; its joints have the names of the rotations."""
+    forms = {".urdf": "urdf", ".xml": "mjcf"}
+    form = forms.get(file.suffix.lower())
+    if form is None:
+        raise typer.BadParameter(f"{file.name!r} must end in .urdf (for ROS) or .xml (for MuJoCo)")
+    require_place(file, overwrite=overwrite)
+    with connect() as service:
+        query = {"form": form, "palm": palm} | ({} if hand is None else {"hand": hand})
+        write_whole({file: service.download(f"/subjects/{name}/robot", query)})
 
 
 def _origin(dimension: str, measured: list[str]) -> str:

@@ -12,6 +12,7 @@ from glovecal_models.hand.dimensions import DIMENSIONS
 from glovecal_models.hand.rotations import Handedness, is_of_hand
 from glovecal_models.hand.skeleton import Palm, skeleton_document
 from glovecal_models.quick_check.answer import DUE
+from glovecal_service.exports.robot_hand import RobotForm, robot_hand
 from glovecal_service.plain import plain
 from glovecal_service.request_types import Channel, Millimetres, StrictBody, SubjectName, Title
 from glovecal_service.rest.http.dependencies import StoreNeeded
@@ -19,6 +20,8 @@ from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import LayoutFilter, SubjectInPath
 from glovecal_service.rest.subject.answer import HistoryRowView, HistoryView, SkeletonView, Subject
 from glovecal_service.store.records import ModelRecord, SubjectRecord
+
+XML = "application/xml"
 
 
 def history_view(subject: str, records: Sequence[ModelRecord]) -> HistoryView:
@@ -143,6 +146,25 @@ def get_skeleton(
     """Joints, axes, offsets and limits; of the other hand with `hand`. With `palm=arching` the little
     finger's metacarpal is a joint, turned by the rotation PALM_ARCH."""
     return skeleton_document(store.subjects.get(name).skeleton(hand, palm))
+
+
+@router.get(
+    "/{name}/robot",
+    response_class=Response,
+    summary="The subject's hand, for robotics",
+    responses=problems()
+    | {200: {"description": "XML.", "content": {XML: {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def get_robot(
+    name: SubjectInPath,
+    store: StoreNeeded,
+    form: RobotForm = "urdf",
+    hand: Handedness | None = None,
+    palm: Palm = "rigid",
+) -> Response:
+    """As URDF (ROS) or MJCF (MuJoCo): joints have the names of the rotations; radians and metres."""
+    text = robot_hand(store.subjects.get(name).skeleton(hand, palm), form)
+    return Response(text, media_type=XML)
 
 
 @router.delete(
