@@ -20,14 +20,14 @@ STEP_DIGITS = 9
 
 def write_c3d(motions: Sequence[HandMotion], content: Content, path: Path) -> None:
     """Hands on one time. A point that is not known is marked as such. Raises BadInput."""
-    import ezc3d  # an extra
-
     time_s, step_s = even_steps(motions[0].time_s, STEP_DIGITS)
     if len(time_s) > MOST_FRAMES:
         raise BadInput(f"{len(time_s)} frames are too many for C3D; export at most {MOST_FRAMES}")
     points: dict[str, np.ndarray] = {}
     for motion in motions:
         points |= markers(at_times(motion, time_s), content)
+    import ezc3d  # an extra
+
     made = ezc3d.c3d()
     parameters = made["parameters"]["POINT"]
     parameters["RATE"]["value"] = [1 / step_s]

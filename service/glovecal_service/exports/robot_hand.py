@@ -97,7 +97,7 @@ def mjcf(skeleton: Skeleton) -> str:
     root = ElementTree.Element("mujoco", model=f"{skeleton.hand}_hand")
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     world = ElementTree.SubElement(root, "worldbody")
-    bodies = {None: ElementTree.SubElement(world, "body", name=ROOT)}
+    bodies: dict[str | None, ElementTree.Element] = {None: ElementTree.SubElement(world, "body", name=ROOT)}
     equal = ElementTree.Element("equality")
     every = hinges(skeleton)
     for joint in skeleton.joints:
@@ -135,7 +135,8 @@ def _link(robot: ElementTree.Element, name: str, length_m: float = 0.0) -> None:
     link = ElementTree.SubElement(robot, "link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "mass", value=f"{MASS_KG:g}")
-    axes = dict.fromkeys(("ixx", "iyy", "izz"), f"{INERTIA:g}") | dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+    axes: dict[str, str] = dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+    axes.update(dict.fromkeys(("ixx", "iyy", "izz"), f"{INERTIA:g}"))
     ElementTree.SubElement(inertial, "inertia", axes)
     if length_m:
         visual = ElementTree.SubElement(link, "visual")
