@@ -47,16 +47,16 @@ def robot_hand(skeleton: Skeleton, form: RobotForm) -> str:
 def hinges(skeleton: Skeleton) -> dict[str, list[Hinge]]:
     """By joint, in the skeleton's order; none where a joint never turns."""
     first: set[str] = set()
-    found: dict[str, list[Hinge]] = {}
+    by_joint: dict[str, list[Hinge]] = {}
     for joint in skeleton.joints:
-        found[joint.name] = []
+        by_joint[joint.name] = []
         for rotation, weight in joint.rotations.items():
             assert weight == 1.0, f"{joint.name} turns by {weight} of {rotation}"
             mimics = rotation in first
             name = f"{joint.name}_{rotation}" if mimics else rotation
-            found[joint.name].append(Hinge(name, joint, rotation, mimics))
+            by_joint[joint.name].append(Hinge(name, joint, rotation, mimics))
             first.add(rotation)
-    return found
+    return by_joint
 
 
 def urdf(skeleton: Skeleton) -> str:

@@ -61,7 +61,7 @@ def test_labrecorder_reads_two_gloves_back_on_one_clock(stage: Stage, tmp_path: 
 
         def is_over() -> bool:
             counts = [bridge.counts(hand.glove) for hand in stage.hands]
-            return all((each["state"], each["reconnects"]) == ("stale", 1) for each in counts)
+            return all(each["state"] == "stale" and each["reconnects"] for each in counts)
 
         eventually(is_over, "all have left, and silence again")
         recorder.stop()

@@ -58,7 +58,7 @@ def test_a_router_that_dies_is_found_again_and_poses_are_stale_meanwhile() -> No
         with open_router([endpoint]), open_client([endpoint]) as session:
             hand = WornHand(session, "right", "right")
             eventually(lambda: moves(hand, bridge), "live again")
-        assert bridge.end()["gloves"]["right"]["reconnects"] == 1
+        assert bridge.end()["gloves"]["right"]["reconnects"] >= 1
 
 
 def moves(hand: WornHand, bridge: RunningBridge) -> bool:

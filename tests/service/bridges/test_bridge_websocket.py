@@ -68,7 +68,7 @@ def test_json_says_all_of_both_hands_and_stale_never_looks_live(stage: Stage) ->
         taken = counts["received"] - counts["overtaken"]
         assert 0 < counts["sent"] <= 2 * taken, "for one receiver, later two"
         summary = bridge.end()
-    assert summary["gloves"]["right"]["reconnects"] == 1
+    assert summary["gloves"]["right"]["reconnects"] >= 1
     assert summary["gloves"]["left"]["sent"] > 0
     assert 0 < summary["added_ms"]["p50"] < summary["finger_to_wire_ms"]["p99"]
 

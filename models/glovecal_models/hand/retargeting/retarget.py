@@ -103,18 +103,18 @@ class Retargeting:
     @cached_property
     def _rests(self) -> np.ndarray:
         """(M, 3, 3) of each bone against its parent in the rest pose."""
-        found = []
+        rests = []
         for name in self.names:
             bone = self.rig.by_name[name]
             parent = self.rig.by_name.get(bone.parent or "")
-            found.append(bone.orientation if parent is None else parent.orientation.T @ bone.orientation)
-        return np.array(found)
+            rests.append(bone.orientation if parent is None else parent.orientation.T @ bone.orientation)
+        return np.array(rests)
 
     @cached_property
     def _carriers(self) -> list[tuple[int | None, np.ndarray]]:
         """Of each bone the next above it that turns, and what stands between that one and its parent; where
         none turns, the parent's orientation in the rest pose."""
-        found: list[tuple[int | None, np.ndarray]] = []
+        carriers: list[tuple[int | None, np.ndarray]] = []
         for name in self.names:
             parent = self.rig.by_name.get(self.rig.by_name[name].parent or "")
             above = parent
@@ -122,10 +122,10 @@ class Retargeting:
                 above = self.rig.by_name.get(above.parent or "")
             own = np.eye(3) if parent is None else parent.orientation
             if above is None:
-                found.append((None, own))
+                carriers.append((None, own))
             else:
-                found.append((self.names.index(above.name), above.orientation.T @ own))
-        return found
+                carriers.append((self.names.index(above.name), above.orientation.T @ own))
+        return carriers
 
 
 def _palm(rig: Rig, mapping: Mapping[str, str], is_left: bool) -> np.ndarray:
