@@ -14,7 +14,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "service"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "service" / "cli"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "service" / "bridges"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "models" / "retargeting"))
+
+from bridge_support import FLAT, SITE, open_stage
+from realtime_support import eventually
+from rigs import CONVENTIONS, rig_like
+
+from glovecal_client.session import open_client
+from glovecal_client.wire.pose import RotationFlag
 from glovecal_models.hand.bones import HandBones
+from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.touches import Touches
 from glovecal_models.hand.skeleton import hand_skeleton
 
 SOURCE = Path(__file__).resolve().parents[2] / "client" / "blender" / "glovecal_blender" / "live_hand.py"
@@ -38,6 +51,26 @@ def test_turns_are_read_as_quaternions_whatever_they_are(live_hand: ModuleType) 
     given = live_hand.quaternions(whole.as_matrix())
     back = Rotation.from_quat(given, scalar_first=True)
     assert np.degrees((back.inv() * whole).magnitude()).max() < 1e-6
+
+
+def test_no_bone_of_a_glove_that_cannot_be_trusted_looks_live(live_hand: ModuleType) -> None:
+    unsure = {"I_PIP": int(RotationFlag.TOO_UNCERTAIN)}
+    with open_stage() as stage, open_client([stage.endpoint]) as session:
+        stage.show(right={"angles": FLAT, "rotation_flags": unsure})
+        hand = live_hand.LiveHand(session, SITE, stage.right.glove)
+        try:
+            skeleton = eventually(lambda: hand.skeleton, "the hand's skeleton")
+            rig = rig_like(CONVENTIONS["rigify"], "right")
+            hand.follow(Touches(Retargeting.of(skeleton, rig)))
+            latest = eventually(lambda: hand.latest, "a pose")
+            usable = dict(zip(hand.names, latest.usable.tolist(), strict=True))
+            assert not usable["f_index.02.R"]
+            assert usable["f_index.01.R"]
+            stage.show(right=None)
+            eventually(lambda: not hand.latest.usable.any(), "no bone looks live in silence")
+            assert "Stale" in hand.sentence
+        finally:
+            hand.close()
 
 
 def test_a_bone_is_as_certain_as_what_turns_it(live_hand: ModuleType) -> None:

@@ -76,9 +76,9 @@ def require_armature(armature: bpy.types.Object | None) -> bpy.types.Object:
 
 def turn(armature: bpy.types.Object, names: Sequence[str], turns: BoneTurns) -> None:
     """The newest pose onto the bones: colour says whether it can be used, a property how certain it is."""
-    colour = GOOD if turns.usable else BAD
-    rows = zip(names, turns.quaternions.tolist(), turns.sd_deg.tolist(), strict=True)
-    for name, quaternion, sd_deg in rows:
+    parts = (turns.quaternions, turns.sd_deg, turns.usable)
+    for name, quaternion, sd_deg, is_usable in zip(names, *(part.tolist() for part in parts), strict=True):
+        colour = GOOD if is_usable else BAD
         bone = armature.pose.bones[name]
         if bone.rotation_mode != "QUATERNION":
             bone.rotation_mode = "QUATERNION"

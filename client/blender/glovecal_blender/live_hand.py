@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import zenoh
@@ -38,8 +38,8 @@ class BoneTurns:
     """(M, 4) w, x, y, z: from the rest pose, in each bone's own axes."""
     sd_deg: np.ndarray
     """(M,) the largest standard deviation of the rotations that turn the bone; NaN where none does."""
-    usable: bool
-    """Neither stale nor too uncertain nor read from a failing sensor."""
+    usable: np.ndarray
+    """(M,) bool: the pose is live, no rotation of the bone too uncertain or of a failing sensor."""
 
 
 class LiveHand:
@@ -100,11 +100,11 @@ class LiveHand:
             if pose is not None:
                 self._take(pose)
             elif self._poses.stale and self.latest is not None:
-                self.sentence = "Stale: no pose for half a second."
+                self._say_not_live("Stale: no pose for half a second.")
 
     def _take(self, pose: Pose) -> None:
         if pose.uncalibrated:
-            self.sentence = "Uncalibrated: no model is active for who wears the glove."
+            self._say_not_live("Uncalibrated: no model is active for who wears the glove.")
             return
         try:
             meta = self._poses.meta(pose)
@@ -112,7 +112,7 @@ class LiveHand:
                 self.skeleton = skeleton_from_document(meta.get("skeleton"))
                 self._held, self._meta = HeldAngles(), meta
         except (NoAnswer, BadInput) as error:
-            self.sentence = str(error)
+            self._say_not_live(str(error))
             return
         self.sentence = ", ".join(pose.words) or "Live."
         touches = self.touches
@@ -125,11 +125,23 @@ class LiveHand:
         turns = made.from_rest(made.against_parents(touches.orientations(angles)))[0]
         self.latest = latest = BoneTurns(
             pose.monotonic_ns, pose.run_id, quaternions(turns), self._deviations(rotations, pose),
-            bool(usable.any()) and not pose.stale,
+            self._usable(rotations, pose),
         )  # fmt: skip
         recorded = self.recording
         if recorded is not None and not pose.stale and len(recorded) < MOST_RECORDED:
             recorded.append(latest)
+
+    def _say_not_live(self, sentence: str) -> None:
+        self.sentence, latest = sentence, self.latest
+        if latest is not None:
+            self.latest = replace(latest, usable=np.zeros(len(latest.usable), bool))
+
+    def _usable(self, rotations: Sequence[str], pose: Pose) -> np.ndarray:
+        assert self.skeleton is not None
+        bad = {name for name, is_usable in zip(rotations, pose.usable, strict=True) if not is_usable}
+        is_bad = np.array([name in bad for name in self.skeleton.rotations])
+        unusable = np.any(self._weights & is_bad, axis=1)
+        return np.logical_not(unusable | pose.stale)
 
     def _deviations(self, rotations: Sequence[str], pose: Pose) -> np.ndarray:
         assert self.skeleton is not None

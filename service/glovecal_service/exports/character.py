@@ -169,15 +169,11 @@ def _turns(touches: Touches, angles_deg: np.ndarray) -> Iterator[tuple[slice, np
 def _matrix(node: Any) -> np.ndarray:
     if "matrix" in node:
         return np.array(node["matrix"], dtype=float).reshape(4, 4).T
+    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
+
     matrix = np.eye(4)
-    x, y, z, w = (float(part) for part in node.get("rotation", (0, 0, 0, 1)))
-    turned = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    quaternion = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=float)
+    turned = Rotation.from_quat(quaternion).as_matrix()
     matrix[:3, :3] = turned * np.array(node.get("scale", (1, 1, 1)), dtype=float)
     matrix[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=float)
     return matrix

@@ -103,13 +103,12 @@ class HandTake:
 
     def motion(self) -> HandMotion:
         model = None if self.artifact is None else load(self.artifact)
-        arches = model is not None and model.method == "template" and PALM in model.rotation_names
         notes = {"take": self.take.name, "hand": self.hand, "model": self.model, "measured": self.measured}
         if self.measured:
             palm = "arching" if PALM in self.take.rotations else "rigid"
             found = measured_motion(self.take, self.subject.skeleton(self.hand, palm), self.label)
             return replace(found, notes=notes | self._labelled(found))
-        skeleton = self.subject.skeleton(self.hand, "arching" if arches else "rigid")
+        skeleton = self.subject.skeleton(self.hand, "rigid" if model is None else model.palm)
         found = motion_of(self.take, model, skeleton, self.label)
         return replace(found, notes=notes | self._labelled(found))
 

@@ -167,6 +167,11 @@ def pinches(hand, count: int = 6) -> np.ndarray:
     return angles[np.argsort(np.linalg.norm(gap, axis=1))[:count]]
 
 
+def tips_of(touches: Touches, joints: np.ndarray) -> dict[str, np.ndarray]:
+    """(N, 3) by finger, from the wrist."""
+    return {finger: joints[:, number, -1] for number, finger in enumerate(touches.chains)}
+
+
 @each_rig
 @each_hand
 def test_a_pinch_stays_a_pinch_where_lengths_differ(convention: str, hand) -> None:
@@ -175,11 +180,11 @@ def test_a_pinch_stays_a_pinch_where_lengths_differ(convention: str, hand) -> No
     angles = pinches(hand)
     plain = retargeting.orientations(angles)
     kept = touches.orientations(angles)
-    own = touches.own_tips_mm(angles)
+    own = tips_of(touches, touches.own_joints_mm(angles))
     wanted = own["index"] - own["thumb"]
 
     def wrong_mm(orientations: np.ndarray) -> np.ndarray:
-        tips = touches.tips(orientations)
+        tips = tips_of(touches, touches.joints(orientations))
         return np.linalg.norm(1 / touches.units_a_mm * (tips["index"] - tips["thumb"]) - wanted, axis=1)
 
     assert wrong_mm(kept).max() < 1.0
@@ -197,7 +202,7 @@ def test_a_hand_that_touches_nothing_is_left_as_it_is_and_nothing_jumps() -> Non
     turned = touches.orientations(closing)
     steps = Rotation.from_matrix((turned[:-1].swapaxes(-1, -2) @ turned[1:]).reshape(-1, 3, 3)).magnitude()
     assert np.degrees(steps.max()) < 3.0
-    own = touches.own_tips_mm(closing)
+    own = tips_of(touches, touches.own_joints_mm(closing))
     distance = np.linalg.norm(own["index"] - own["thumb"], axis=1)
     assert distance[0] > FAR_MM > distance[-1]
     assert len(names) == closing.shape[1]

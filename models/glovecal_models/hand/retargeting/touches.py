@@ -63,11 +63,6 @@ class Touches:
             turned[near] = self._turned(turned[near], thumb, wanted, weights[near])
         return turned
 
-    def tips(self, orientations: np.ndarray) -> dict[str, np.ndarray]:
-        """(N, 3) by finger: the rig's fingertips from the head of its hand bone, in its world and unit."""
-        places = self.joints(orientations)[:, :, -1]
-        return {finger: places[:, number] for number, finger in enumerate(self.chains)}
-
     def own_joints_mm(self, angles_deg: np.ndarray) -> np.ndarray:
         """(N, F, K + 1, 3) as ``joints``, of the hand itself, from its wrist, in the rig's world, mm."""
         bones = self.retargeting.bones
@@ -76,13 +71,6 @@ class Touches:
             [[bones.names.index(f"{finger}_{part}") for part in PHALANGES[finger]] for finger in self.chains]
         )
         return np.concatenate([places[:, numbers, 0], places[:, numbers[:, -1:], 1]], axis=2)
-
-    def own_tips_mm(self, angles_deg: np.ndarray) -> dict[str, np.ndarray]:
-        """(N, 3) by finger: the hand's fingertips from its wrist, in the rig's world."""
-        bones = self.retargeting.bones
-        places = bones.posed(angles_deg)[1]
-        lasts = {finger: bones.names.index(f"{finger}_{parts[-1]}") for finger, parts in PHALANGES.items()}
-        return {finger: places[:, last, 1] @ self.retargeting.palm.T for finger, last in lasts.items()}
 
     @cached_property
     def chains(self) -> dict[str, Chain]:
