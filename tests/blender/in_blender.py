@@ -71,6 +71,10 @@ def wait_for(condition: Any, live: Any, armature: Any, what: str) -> None:
         time.sleep(TICK_S)
 
 
+RECORDED_S = 5.0
+"""A recording holds its poses; what is measured to grow is the live hand alone."""
+
+
 def run_live(live: Any, armature: Any, seconds: float) -> list[float]:
     """Milliseconds of each tick on the main thread."""
     spent = []
@@ -127,10 +131,11 @@ def live_hands(endpoint: str, seconds: float, rate_hz: float) -> dict[str, Any]:
             "time_ns": latest.time_ns, "places": places(rig), "mapping": mapping,
             "palm": hand.touches.retargeting.palm.tolist(),
         }  # fmt: skip
-    bpy.ops.glovecal.record()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     answer["ms a frame"] = run_live(live, rig, seconds)
     answer["grown MB"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    bpy.ops.glovecal.record()
+    run_live(live, rig, RECORDED_S)
     recorded = [[turns.time_ns for turns in hand.recording] for hand in live.hands]
     bpy.ops.glovecal.stop()
     action = rig.animation_data.action

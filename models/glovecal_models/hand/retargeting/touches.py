@@ -14,6 +14,7 @@ import numpy as np
 
 from glovecal_models.hand.bones import HAND, PHALANGES
 from glovecal_models.hand.retargeting.retarget import Retargeting, direction
+from glovecal_models.hand.retargeting.turns import cross, turn
 
 FAR_MM, TOUCHING_MM = 35.0, 12.0
 """Between the hand's own fingertips: from where on joints are turned further, and where all of it is done."""
@@ -25,6 +26,11 @@ LAST_SHARE = 0.75
 """Of the bone before: how long a finger's last bone is taken to be where the rig does not say it."""
 _FLEX, _SPREAD = 1, 2
 """Axes of a segment about which its joint turns."""
+
+
+def nearness(distance_mm: np.ndarray) -> np.ndarray:
+    """0 for fingertips that are far from each other, 1 for those that touch."""
+    return np.clip((FAR_MM - distance_mm) / (FAR_MM - TOUCHING_MM), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ class Touches:
         thumb = list(self.chains).index("thumb")
         gaps = np.delete(tips - tips[:, [thumb]], thumb, axis=1)
         distance = np.linalg.norm(gaps, axis=2)
-        weights = np.clip((FAR_MM - distance) / (FAR_MM - TOUCHING_MM), 0.0, 1.0)
+        weights = nearness(distance)
         near = weights.any(axis=1)
         if near.any():
             wanted = self.units_a_mm * gaps[near] @ self.retargeting.palm.T
@@ -151,7 +157,7 @@ class Touches:
             segments = turned[:, self._numbers] @ fastened
             about = segments[:, :, places, :, axes].transpose(1, 2, 0, 3)
             arms = joints[:, :, [-1]] - joints[:, :, places]
-            moved = _cross(about, arms) / size
+            moved = cross(about, arms) / size
             rows = np.zeros((count, len(others), 3, fingers, len(_JOINTS)))
             rows[:, :, :, thumb] = -moved[:, thumb].swapaxes(1, 2)[:, None]
             for row, finger in enumerate(others):
@@ -167,7 +173,7 @@ class Touches:
             parts = step.reshape(count, fingers, -1, 1) * about
             for column, place in enumerate(places):
                 vectors[:, :, place] += parts[:, :, column]
-            turns = _turn(vectors)
+            turns = turn(vectors)
             for place in range(1, turns.shape[2]):
                 turns[:, :, place] = turns[:, :, place - 1] @ turns[:, :, place]
             turned[:, self._numbers] = turns @ turned[:, self._numbers]
@@ -176,21 +182,3 @@ class Touches:
 
 _JOINTS = ((0, _FLEX), (0, _SPREAD), (1, _FLEX), (2, _FLEX))
 """Of each finger: which bone turns, about which of its segment's axes."""
-
-
-def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(..., 3), as numpy's, which takes three times as long for a few."""
-    a, b, c = first[..., 0], first[..., 1], first[..., 2]
-    x, y, z = second[..., 0], second[..., 1], second[..., 2]
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
-
-
-def _turn(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of rotation vectors (..., 3): Rodrigues' formula."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    axes = vectors / np.where(angle[..., 0] > 0, angle[..., 0], 1.0)
-    x, y, z = axes[..., 0], axes[..., 1], axes[..., 2]
-    cross = np.zeros((*x.shape, 3, 3))
-    cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -z, y, -x
-    cross -= cross.swapaxes(-1, -2)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
