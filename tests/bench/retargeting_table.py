@@ -1,11 +1,13 @@
-"""How far fingertips are, and how many touches are lost, on skeletons like those of five programs:
-``python3 do.py bench retargeting``. The skeletons are made up (``tests/models/retargeting/rigs.py``)."""
+"""Fingertips and lost touches on other skeletons and on robots' hands: ``python3 do.py bench retargeting``.
+
+Skeletons like those of five programs are made up (``tests/models/retargeting/rigs.py``)."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +17,50 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "models" / "retarge
 from rigs import CONVENTIONS, rig_like
 
 from glovecal_models.hand.retargeting.retarget import Retargeting
+from glovecal_models.hand.retargeting.robot import RobotHand, known_robots
+from glovecal_models.hand.retargeting.robot_retarget import RobotRetargeting
 from glovecal_models.hand.retargeting.touches import TOUCHING_MM, Touches
-from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS
+from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HANDS, known_hand
 from glovecal_models.hand.skeleton import hand_skeleton
 
-POSES, DRAWN, SEED, LOST_MM = 500, 20_000, 11, 10.0
+POSES, DRAWN, SEED, LOST_MM, LIVE = 500, 20_000, 11, 10.0, 100
+
+
+def _robot(name: str, drawn: np.ndarray) -> dict[str, float]:
+    hand = known_hand(name.rpartition("_")[2])
+    made = RobotRetargeting(hand_skeleton(hand=hand or "right"), RobotHand.known(name))
+    own = made.own_joints_mm(drawn)
+
+    def gaps(joints: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(joints[:, 1:, -1] - joints[:, :1, -1], axis=2)
+
+    closed = gaps(own) < TOUCHING_MM
+    near = np.flatnonzero(closed.any(axis=1))[:POSES]
+    shown = made.shown_joints_mm(drawn[:POSES])
+    rms = float(np.sqrt((np.linalg.norm(own[:POSES, :, -1] - shown[:, :, -1], axis=2) ** 2).mean()))
+    steps = [np.diff(each, axis=2) for each in (own[:POSES], shown)]
+    lengths = np.prod([np.linalg.norm(each, axis=3) for each in steps], axis=0)
+    cosine = (steps[0] * steps[1]).sum(axis=3) / lengths
+    degrees = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    lost = closed[near] & (gaps(made.shown_joints_mm(drawn[near])) > gaps(own[near]) + LOST_MM)
+    before = made.radians(drawn[:1])[0]
+    began = time.perf_counter()
+    for pose in drawn[:LIVE]:
+        before = made.radians(pose[None], before)[0]
+    live_ms = 1e3 * (time.perf_counter() - began) / LIVE
+    fingers, thumb = float(np.median(degrees[:, 1:])), float(np.median(degrees[:, 0]))
+    print(
+        f"| {name.replace('_', ', ')} | {rms:.1f} | {fingers:.1f}; {thumb:.1f} | {lost.any(axis=1).sum()} of "
+        f"{len(near)} | {live_ms:.1f} |"
+    )
+    return {
+        "fingertip_rms_mm": rms,
+        "fingers_deg": fingers,
+        "thumb_deg": thumb,
+        "lost": int(lost.any(axis=1).sum()),
+        "touches": len(near),
+        "live_ms": live_ms,
+    }
 
 
 def main() -> int:
@@ -57,6 +98,12 @@ def main() -> int:
         rms = float(np.sqrt((np.concatenate(away) ** 2).mean()))
         found[name] = {"fingertip_rms_mm": rms, "touches": counts.tolist()}
         print(f"| {name} | {rms:.1f} | {counts[1]}, {counts[2]} of {counts[0]} |")
+    print(
+        "\n| robot | fingertips, mm | bones, degrees (median; thumb) | touches lost | ms a frame, live |"
+    )
+    print("|---|---|---|---|---|")
+    for name in known_robots():
+        found[name] = _robot(name, drawn)
     if options.json is not None:
         options.json.write_text(json.dumps(found))
     return 0

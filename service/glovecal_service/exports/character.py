@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,9 +18,11 @@ import numpy as np
 
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.bone_names import bones_of
 from glovecal_models.hand.retargeting.retarget import Retargeting
-from glovecal_models.hand.retargeting.rig import Rig, RigBone
+from glovecal_models.hand.retargeting.rig import Rig, RigBone, hand_of
 from glovecal_models.hand.retargeting.touches import Touches
+from glovecal_models.hand.skeleton import Skeleton
 from glovecal_service.exports.body_motion import SIDES, continuous_quaternions, whole_angles
 from glovecal_service.exports.gltf import (
     BINARY_CHUNK,
@@ -32,6 +34,7 @@ from glovecal_service.exports.gltf import (
 )
 from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 
+SUFFIX = ".glb"
 LARGEST_JSON = 64_000_000
 MOST_LISTED = 20_000
 """Nodes of a scene."""
@@ -108,8 +111,25 @@ class Character:
             )
             waiting += [(child, depth + 1, own) for child in listed[number].get("children", ())]
 
-    def write(self, motions: Sequence[HandMotion], content: Content, path: Path) -> None:
-        """Hands on one time, as an animation more. Raises BadInput where a hand is not found."""
+    def shown(self, skeleton: Skeleton, bones: Mapping[str, str]) -> Touches:
+        """Raises BadInput where a hand is not found."""
+        chosen = bones_of(bones, skeleton.hand)
+        try:
+            mapping = hand_of(self.rig, skeleton.hand)
+        except BadInput:
+            if not chosen:
+                raise
+            mapping = {}
+        mapping = {own: name for own, name in (mapping | chosen).items() if name}
+        return Touches(Retargeting.of(skeleton, self.rig, mapping))
+
+    def write(
+        self, motions: Sequence[HandMotion], content: Content, path: Path, bones: Mapping[str, str]
+    ) -> None:
+        """Hands on one time, as an animation more. Raises BadInput where a hand is not found, and for another
+        format than the character's."""
+        if path.suffix != SUFFIX:
+            raise BadInput(f"a character moves in a {SUFFIX} file, not in {path.suffix}")
         document = json.loads(json.dumps(self.document))
         numbers = BinaryNumbers(
             document.setdefault("accessors", []), document.setdefault("bufferViews", []),
@@ -120,7 +140,7 @@ class Character:
         channels, samplers, planned = [], [], []
         for motion in motions:
             motion.require_angles(content)
-            touches = Touches(Retargeting.of(motion.skeleton, self.rig))
+            touches = self.shown(motion.skeleton, bones)
             rooms = [numbers.room(FLOAT, "VEC4", len(time_s)) for _ in touches.retargeting.names]
             for name, room in zip(touches.retargeting.names, rooms, strict=True):
                 number = self.names.index(name)
@@ -138,9 +158,9 @@ class Character:
         with path.open("wb") as stream:
             begin = write_container(stream, document, numbers)
             stream.seek(begin)
-            with self.path.open("rb") as own:
-                own.seek(self.begins)
-                shutil.copyfileobj(_Part(own, self.length), stream)
+            with self.path.open("rb") as file:
+                file.seek(self.begins)
+                shutil.copyfileobj(_Part(file, self.length), stream)
             numbers.write(stream, begin)
             for touches, angles, rooms in planned:
                 for which, quaternions in continuous_quaternions(_turns(touches, angles)):

@@ -6,7 +6,7 @@ All that is needed is plain data, so that a process of its own can write it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,10 @@ from glovecal_models.takes.hand_clocks import TakeClock, align, common_events
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.exports.body_markers import Wrist, hand_frame, read_trc
-from glovecal_service.exports.character import Character
 from glovecal_service.exports.character_fit import CharacterFit
 from glovecal_service.exports.formats import format_of, require_possible
 from glovecal_service.exports.hand_motion import Content, HandMotion, on_one_time
+from glovecal_service.exports.onto import read_onto
 from glovecal_service.exports.resampling import Resampling
 from glovecal_service.store.records import SubjectRecord
 
@@ -141,8 +141,10 @@ class MotionFile:
     wrist: Wrist
     body: Body | None
     resampling: Resampling
-    character: Path | None = None
-    """A file whose skeleton is to move, instead of the body's."""
+    onto: Path | str | None = None
+    """A file of a character or a robot, or a robot's name: what is to move instead of a body at rest."""
+    bones: Mapping[str, str] = field(default_factory=dict)
+    """Of it, by the hand's, where others are meant than those that are found; see ``bones_of``."""
 
     def __post_init__(self) -> None:
         labels = [hand.label for hand in self.hands]
@@ -154,8 +156,8 @@ class MotionFile:
         require_possible(format_of(self.path.name), self.content)
         if self.body is not None and (self.content, self.path.suffix) != ("joints", ".trc"):
             raise BadInput("markers of a body are joined to joints in a TRC file: content joints, format trc")
-        if self.character is not None and self.path.suffix != ".glb":
-            raise BadInput(f"a character moves in a .glb file, not in {self.path.suffix}")
+        if self.bones and self.onto is None:
+            raise BadInput("bones are named, but nothing onto which the motion goes; name it, too")
         if self.frames > MOST_FRAMES:
             raise BadInput(f"{self.frames} frames are too many for one file; export at most {MOST_FRAMES}")
 
@@ -171,17 +173,19 @@ class MotionFile:
 def write_motion(asked: MotionFile) -> None:
     """Raises BadInput, LayoutMismatch, DamagedArtifact."""
     hands = hands_in_motion(asked)
-    if asked.character is not None:
-        Character.read(asked.character, "the character's file").write(hands, asked.content, asked.path)
+    if asked.onto is not None:
+        read_onto(asked.onto).write(hands, asked.content, asked.path, asked.bones)
     else:
         format_of(asked.path.name).write(hands, asked.content, asked.path)
 
 
 def fits(asked: MotionFile) -> list[CharacterFit]:
-    """How well the character shows each hand. Raises as ``write_motion``."""
-    assert asked.character is not None
-    character = Character.read(asked.character, "the character's file")
-    return [CharacterFit.of(motion, character) for motion in hands_in_motion(asked)]
+    """How well the character or robot shows each hand. Raises as ``write_motion``."""
+    assert asked.onto is not None
+    onto = read_onto(asked.onto)
+    return [
+        CharacterFit.of(motion, onto.shown(motion.skeleton, asked.bones)) for motion in hands_in_motion(asked)
+    ]
 
 
 def hands_in_motion(asked: MotionFile) -> list[HandMotion]:

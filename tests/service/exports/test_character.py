@@ -36,7 +36,7 @@ def test_its_bones_point_where_the_hands_point(tmp_path: Path, convention: str) 
         hand.degrees[:] = np.clip(hand.degrees, 0, 40)
         for name, angle in {"T_TMC": 0.0, "TI_ABD": 65.0, "T_MCP": 0.0, "T_IP": 0.0}.items():
             hand.degrees[:, hand.rotations.index(name)] = angle
-    character.write(hands, "joints", tmp_path / "moved.glb")
+    character.write(hands, "joints", tmp_path / "moved.glb", {})
     assert b"what was there before" in (tmp_path / "moved.glb").read_bytes()
     for frame in (0, 7):
         places = read_glb(tmp_path / "moved.glb", frame / RATE_HZ)
@@ -59,7 +59,7 @@ def test_how_well_it_fits_is_told(tmp_path: Path, convention: str) -> None:
     write_character(tmp_path / "character.glb", convention)
     character = Character.read(tmp_path / "character.glb", "character.glb")
     motion = moving("L", count=800)
-    fit = CharacterFit.of(motion, character)
+    fit = CharacterFit.of(motion, character.shown(motion.skeleton, {}))
     assert fit.bones["index_proximal"] == hand_of(character.rig, "left")["index_proximal"]
     assert fit.missing == ()
     assert 0.5 < fit.fingertip_mm < 20.0
@@ -73,7 +73,7 @@ def test_a_character_of_the_hands_own_size_is_exact(tmp_path: Path) -> None:
 
     motion = moving("R", count=50)
     FORMATS[".glb"].write([motion], "joints", tmp_path / "own.glb")
-    fit = CharacterFit.of(motion, Character.read(tmp_path / "own.glb", "own.glb"))
+    fit = CharacterFit.of(motion, Character.read(tmp_path / "own.glb", "own.glb").shown(motion.skeleton, {}))
     assert fit.fingertip_mm < 0.05
     assert fit.lost == 0
 
@@ -94,7 +94,7 @@ def test_a_node_given_as_a_matrix_is_animated_all_the_same(tmp_path: Path) -> No
     given_as_matrix = replace(plain, document=document)
     motion = moving("R")
     for name, character in (("a", plain), ("b", given_as_matrix)):
-        character.write([motion], "joints", tmp_path / f"{name}.glb")
+        character.write([motion], "joints", tmp_path / f"{name}.glb", {})
     first, second = (read_glb(tmp_path / f"{name}.glb", 5 / RATE_HZ) for name in "ab")
     for name, place in first.items():
         np.testing.assert_allclose(second[name], place, atol=1e-3)
@@ -122,7 +122,9 @@ def container(document: object) -> bytes:
 def test_what_is_no_character_is_refused(tmp_path: Path, content: bytes, why: str) -> None:
     (tmp_path / "odd.glb").write_bytes(content)
     with pytest.raises(BadInput, match=why):
-        Character.read(tmp_path / "odd.glb", "odd.glb").write([moving("L")], "joints", tmp_path / "out.glb")
+        Character.read(tmp_path / "odd.glb", "odd.glb").write(
+            [moving("L")], "joints", tmp_path / "out.glb", {}
+        )
 
 
 KEYS = ("nodes", "name", "children", "rotation", "matrix", "scale", "translation")

@@ -17,7 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "exports"))
 from characters import write_character
 
 from glovecal_client.rest import Refused, RestClient
+from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.marker_tables import trc_text
+from glovecal_service.exports.robot_hand import robot_hand
 
 Write = Callable[..., Path]
 
@@ -123,10 +125,10 @@ def test_a_character_is_told_of_and_moved(client: RestClient, tmp_path: Path) ->
     [right, _] = takes(client)
     write_character(tmp_path / "hero.glb", "unreal")
     body = {"takes": [right], "measured": True, "format": "glb"}
-    with pytest.raises(Refused, match="no character is named") as refused:
+    with pytest.raises(Refused, match="neither a character nor a robot is named") as refused:
         client.post("/motion/character", body)
     assert refused.value.status == 422
-    with pytest.raises(Refused, match=r"no upload 0{12}; send the character's .glb") as refused:
+    with pytest.raises(Refused, match=r"no upload 0{12}; send the character's or robot's file") as refused:
         client.post("/motion/character", body | {"onto": "0" * 64})
     assert refused.value.status == 404
     body |= {"onto": client.upload(tmp_path / "hero.glb")}
@@ -142,6 +144,31 @@ def test_a_character_is_told_of_and_moved(client: RestClient, tmp_path: Path) ->
     other = client.upload(write_nothing(tmp_path))
     with pytest.raises(Refused, match="does not begin as glTF does"):
         client.post("/motion/character", body | {"onto": other})
+
+
+def test_a_robots_joints_are_told_of_and_written(client: RestClient, tmp_path: Path) -> None:
+    [right, _] = takes(client)
+    body = {"takes": [right], "measured": True, "format": "csv", "onto": "allegro"}
+    [fit] = client.post("/motion/character", body)
+    assert fit["missing"] == ["pinky_proximal", "pinky_intermediate", "pinky_distal"]
+    assert "ff_proximal" in fit["choices"]
+    head = client.made("/motion", body).decode().splitlines()[0].split(",")
+    assert {"r.ffj0", "r.thj3"} <= set(head)
+    (tmp_path / "own.urdf").write_text(robot_hand(hand_skeleton(), "urdf"))
+    body |= {"onto": client.upload(tmp_path / "own.urdf"), "format": "parquet"}
+    with pytest.raises(Refused, match="add them to it as fixed links") as refused:
+        client.made("/motion", body)
+    assert refused.value.status == 422
+    joints = {"proximal": "MCP", "intermediate": "PIP", "distal": "DIP"}
+    links = {
+        f"{finger}_{part}": f"{finger[0].upper()}_{joint}"
+        for finger in ("index", "middle") for part, joint in joints.items()
+    }  # fmt: skip
+    assert client.made("/motion", body | {"bones": {"hand": "W_FLEX", **links}})[:4] == b"PAR1"
+    with pytest.raises(Refused, match="no bone 'thumb_toe'"):
+        client.made("/motion", body | {"bones": {"thumb_toe": "T_IP"}})
+    with pytest.raises(Refused, match="nothing onto which"):
+        client.made("/motion", body | {"onto": None, "bones": links})
 
 
 def write_nothing(folder: Path) -> Path:

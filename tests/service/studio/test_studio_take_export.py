@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import sys
 from pathlib import Path
 from typing import Any
@@ -62,11 +63,17 @@ def test_a_character_moves_and_the_page_shows_which_bone_is_which(
         page.get_by_role("button", name="Choose a character (.glb)").click()
     chooser.value.set_files(tmp_path / "hero.glb")
     bones = page.get_by_role("region", name="Which bone is which, right hand")
-    expect(bones.get_by_role("row", name="index proximal mixamorig:RightHandIndex1")).to_be_visible(
-        timeout=PATIENCE_MS
-    )
-    expect(page.get_by_role("img", name="Hand and character")).to_be_visible()
+    field = bones.get_by_label("index proximal, right")
+    expect(field).to_have_value("mixamorig:RightHandIndex1", timeout=PATIENCE_MS)
+    expect(page.get_by_role("img", name="The hand, and how it is shown")).to_be_visible()
     assert serious(page) == []
+    field.fill("RightHandMiddle1")
+    page.get_by_role("option", name="mixamorig:RightHandMiddle1").click()
+    expect(page.get_by_role("button", name="Bones as they were found")).to_be_visible()
+    expect(bones.get_by_label("index proximal, right")).to_have_value("mixamorig:RightHandMiddle1")
+    page.get_by_role("button", name="Bones as they were found").click()
+    expect(bones.get_by_label("index proximal, right")).to_have_value("mixamorig:RightHandIndex1")
+    expect(page.get_by_role("button", name="Bones as they were found")).to_have_count(0)
     with page.expect_download() as saved:
         page.get_by_role("button", name="Export the motion").click()
     saved.value.save_as(tmp_path / "moved.glb")
@@ -74,6 +81,28 @@ def test_a_character_moves_and_the_page_shows_which_bone_is_which(
     moved = {document.nodes[channel.target.node].name for channel in document.animations[0].channels}
     assert "mixamorig:RightHandIndex1" in moved
     assert not any("Left" in name for name in moved)
+    assert seen.complaints == []
+
+
+def test_a_robots_joints_are_written_in_place_of_the_persons(opened: Open, take: str, tmp_path: Path) -> None:
+    seen = opened(f"take?id={take}")
+    page = seen.page
+    page.get_by_text("Export for animation tools and analysis").click()
+    page.get_by_role("combobox", name="Format").click()
+    page.get_by_role("option", name="CSV (.csv)").click()
+    page.get_by_role("combobox", name="Robot hand").click()
+    page.get_by_role("option", name="Shadow").click()
+    expect(page.get_by_role("region", name="Which bone is which, right hand")).to_be_visible(
+        timeout=PATIENCE_MS
+    )
+    expect(page.get_by_text("fingertips are")).to_be_visible()
+    assert serious(page) == []
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Export the motion").click()
+    saved.value.save_as(tmp_path / "robot.csv")
+    rows = list(csv.DictReader((tmp_path / "robot.csv").read_text().splitlines()))
+    bent = [float(row["r.rh_FFJ2"]) for row in rows]
+    assert bent[-1] - bent[0] > 40, "the index finger's middle joint bends from 0 to 60 degrees"
     assert seen.complaints == []
 
 

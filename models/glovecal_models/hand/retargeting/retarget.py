@@ -55,6 +55,8 @@ class Retargeting:
                 raise BadInput(f"a hand has no bone {own!r}; {did_you_mean(own, bones.names)}")
             if other not in rig.by_name:
                 raise BadInput(f"the rig has no bone {other!r}, which is to be {own}")
+        if HAND not in mapping:
+            raise BadInput("the bone of the hand itself is missing; say which it is")
         palm = _palm(rig, mapping, skeleton.hand == "left")
         order = {bone.name: number for number, bone in enumerate(rig.bones)}
         own_names = sorted(mapping, key=lambda name: order[mapping[name]])

@@ -12,6 +12,7 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HAND, PHALANGES
+from glovecal_models.hand.retargeting.bone_names import BONES_AND_TIPS, TIP
 from glovecal_models.hand.retargeting.turns import turned_about
 from glovecal_models.names import did_you_mean
 
@@ -19,7 +20,6 @@ MM_PER_M = 1e3
 LARGEST_URDF = 5_000_000
 """Characters."""
 MOST_LINKS = 2_000
-TIP = "tip"
 _ROBOTS = Path(__file__).with_name("robots")
 _TURNING, _STILL = ("revolute", "continuous"), ("fixed",)
 
@@ -63,6 +63,9 @@ class RobotHand:
     joints: tuple[RobotJoint, ...]
     points: Mapping[str, tuple[int | None, np.ndarray, np.ndarray]]
     """By the hand's bone where it begins, or ``index_tip`` and so on: hinge, place (3,) mm, turn (3, 3)."""
+    links: Mapping[str, str]
+    """Names of the links that these are."""
+    every_link: tuple[str, ...] = ()
 
     @classmethod
     def known(cls, name: str) -> RobotHand:
@@ -71,17 +74,16 @@ class RobotHand:
 
     @classmethod
     def from_urdf(cls, text: str, name: str, links: Mapping[str, str] | None = None) -> RobotHand:
-        """``links``: the robot's link by the hand's bone (``hand``, ``index_proximal``, ..., ``index_tip``);
-        by default links of those very names. The axes of the hand's link: x from the wrist to the middle
-        finger's knuckle, z out of the back of the hand.
+        """``links``: the robot's link by the hand's bone (``hand``, ``index_proximal``, ..., ``index_tip``),
+        where it is not the link of that very name; "": none. The axes of the hand's link: x from the wrist to
+        the middle finger's knuckle, z out of the back of the hand.
 
         Raises BadInput that names ``name`` for what is no URDF, for a hand without two fingers, and for links
         or joints that cannot be used.
         """
         tree = _Tree.of(text, name)
-        wanted = (
-            {bone: bone for bone in BONES_AND_TIPS if bone in tree.links} if links is None else dict(links)
-        )
+        wanted = {bone: bone for bone in BONES_AND_TIPS if bone in tree.links} | dict(links or {})
+        wanted = {bone: link for bone, link in wanted.items() if link}
         for bone, link in wanted.items():
             if bone not in BONES_AND_TIPS:
                 raise BadInput(f"a hand has no {bone!r}; {did_you_mean(bone, BONES_AND_TIPS)}")
@@ -89,7 +91,12 @@ class RobotHand:
                 raise BadInput(
                     f"{name} has no link {link!r}, which is to be {bone}; {did_you_mean(link, tree.links)}"
                 )
-        made = cls(tuple(tree.hinges), {bone: tree.links[link] for bone, link in wanted.items()})
+        made = cls(
+            tuple(tree.hinges),
+            {bone: tree.links[link] for bone, link in wanted.items()},
+            wanted,
+            tuple(tree.links),
+        )
         if HAND not in made.points or len(made.fingers) < 2:
             raise BadInput(
                 f"{name} has no hand that is known: links `hand` and of two fingers, as `index_proximal`, "
@@ -185,12 +192,6 @@ class RobotHand:
             parents = [self.joints[number].parent for number in numbers]
             levels.append((numbers, None if below == 1 else [each for each in parents if each is not None]))
         return levels
-
-
-BONES_AND_TIPS: tuple[str, ...] = (
-    HAND, *(f"{finger}_{part}" for finger, parts in PHALANGES.items() for part in (*parts, TIP))
-)  # fmt: skip
-"""What a robot's links are asked for."""
 
 
 class _Tree:

@@ -16,7 +16,8 @@ import numpy as np
 
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import DISTAL, HAND, METACARPAL, PHALANGES, HandBones
-from glovecal_models.hand.retargeting.robot import TIP, RobotHand
+from glovecal_models.hand.retargeting.bone_names import TIP
+from glovecal_models.hand.retargeting.robot import RobotHand
 from glovecal_models.hand.retargeting.touches import nearness
 from glovecal_models.hand.retargeting.turns import cross
 from glovecal_models.hand.skeleton import Skeleton
@@ -51,6 +52,25 @@ class RobotRetargeting:
     @property
     def fingers(self) -> tuple[str, ...]:
         return self.robot.fingers
+
+    @property
+    def palm(self) -> np.ndarray:
+        """(3, 3) axes of the hand in which joints are told: its own."""
+        return np.eye(3)
+
+    @property
+    def mapping(self) -> dict[str, str]:
+        """The robot's link by the hand's bone."""
+        return dict(self.robot.links)
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Names of the robot's links."""
+        return self.robot.every_link
+
+    def shown_joints_mm(self, angles_deg: np.ndarray) -> np.ndarray:
+        """``joints`` of a hand's angles."""
+        return self.joints(self.radians(angles_deg))
 
     def radians(self, angles_deg: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
         """(N, J) of the robot's joints ``robot.free``, within their limits; of ``angles_deg`` (N, R) in the

@@ -15,6 +15,7 @@ import numpy as np
 from glovecal_models.hand.bones import HAND, PHALANGES
 from glovecal_models.hand.retargeting.retarget import Retargeting, direction
 from glovecal_models.hand.retargeting.turns import cross, turn
+from glovecal_models.hand.skeleton import Skeleton
 
 FAR_MM, TOUCHING_MM = 35.0, 12.0
 """Between the hand's own fingertips: from where on joints are turned further, and where all of it is done."""
@@ -77,6 +78,33 @@ class Touches:
             [[bones.names.index(f"{finger}_{part}") for part in PHALANGES[finger]] for finger in self.chains]
         )
         return np.concatenate([places[:, numbers, 0], places[:, numbers[:, -1:], 1]], axis=2)
+
+    def shown_joints_mm(self, angles_deg: np.ndarray) -> np.ndarray:
+        """As ``own_joints_mm``, of the rig, in the hand's size."""
+        return self.joints(self.orientations(angles_deg)) / self.units_a_mm
+
+    @property
+    def fingers(self) -> tuple[str, ...]:
+        return tuple(self.chains)
+
+    @property
+    def palm(self) -> np.ndarray:
+        """(3, 3) axes of the hand in the rig's world, in which joints are told."""
+        return self.retargeting.palm
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return self.retargeting.bones.skeleton
+
+    @property
+    def mapping(self) -> dict[str, str]:
+        """The rig's bone by the hand's."""
+        return self.retargeting.mapping
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Names of the rig's bones."""
+        return tuple(bone.name for bone in self.retargeting.rig.bones)
 
     @cached_property
     def chains(self) -> dict[str, Chain]:

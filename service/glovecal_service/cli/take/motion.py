@@ -33,6 +33,20 @@ def _names(given: str | None) -> list[str]:
     return [name.strip() for name in (given or "").split(",") if name.strip()]
 
 
+def _pairs(given: list[str] | None) -> list[str] | None:
+    for pair in given or ():
+        if "=" not in pair:
+            raise typer.BadParameter(f"{pair!r} says no bone: index_proximal=NAME")
+    return given
+
+
+def _existing(onto: str) -> Path:
+    file = Path(onto)
+    if not file.is_file():
+        raise typer.BadParameter(f"{onto!r} is neither a file nor a robot hand that comes with Glovecal")
+    return file
+
+
 def _say_fit(row: dict[str, Any]) -> None:
     lacks = f"; it lacks {', '.join(row['missing'])}" if row["missing"] else ""
     touches = f"{row['lost']} of {row['touches']} touches lost" if row["touches"] else "no touches"
@@ -94,14 +108,28 @@ def motion(
     ] = None,
     left: Annotated[str | None, typer.Option(metavar="MARKERS", help="That place the left hand.")] = None,
     onto: Annotated[
-        Path | None,
-        typer.Option(exists=True, dir_okay=False, help="A character (.glb) whose skeleton is to move."),
+        str | None,
+        typer.Option(
+            metavar="FILE|ROBOT",
+            help="A character (.glb) whose skeleton is to move; or a robot's hand, shadow, allegro, leap or "
+            "its URDF, whose joint angles are written.",
+        ),
+    ] = None,
+    bone: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="BONE=NAME",
+            callback=_pairs,
+            help="Of --onto: a bone of the hand (index_proximal, left.index_proximal) and its name there, "
+            "where another is found.",
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write one hand or both as motion: BVH for animation (on a body at rest), TRC for OpenSim and
     MotionBuilder, CSV or Parquet for analysis."""
     from glovecal_service.exports.formats import format_of
+    from glovecal_service.exports.robot_motion import KINDS
 
     chosen = format_of(file.name)
     if len(take) > MOST_HANDS:
@@ -127,7 +155,8 @@ def motion(
             markers = {"right": _names(right), "left": _names(left)}
             asked |= {"body": {"upload": service.upload(body), "shift_s": body_shift, **markers}}
         if onto is not None:
-            asked |= {"onto": service.upload(onto)}
+            asked |= {"onto": onto if onto in KINDS else service.upload(_existing(onto))}
+            asked |= {"bones": dict(pair.split("=", 1) for pair in bone or ())}
             for hand_row in service.post("/motion/character", asked):
                 _say_fit(hand_row)
         write_whole({file: service.made("/motion", asked)})

@@ -253,18 +253,23 @@ class MotionFormat(Row):
     times: str
     accuracy: str = Field(description="What it holds of the angles' standard deviations and flags.")
     read_by: str
+    characters: bool = Field(description="Whether it can hold a character of your own that moves.")
+    robots: list[str] = Field(description="Robot hands whose joint angles it can hold.")
 
 
 class CharacterHand(Row):
-    """How well a character's hand shows a motion."""
+    """How well the hand of a character or a robot shows a motion."""
 
     hand: Handedness
-    bones: dict[str, str] = Field(description="The character's bone by the hand's.")
-    missing: list[str] = Field(description="Bones of the hand that the character lacks.")
+    bones: dict[str, str] = Field(
+        description="The character's bone, or the robot's link, by the hand's bone."
+    )
+    missing: list[str] = Field(description="Bones of the hand that it lacks.")
+    choices: list[str] = Field(description="Names of its bones or links, of which others can be chosen.")
     fingertip_mm: float = Field(
-        description="Root mean square over frames and fingers: how far the character's fingertips are from "
+        description="Root mean square over frames and fingers: how far its fingertips are from "
         "the hand's, both seen from the wrist, in the hand's size."
     )
     touches: int = Field(description="Frames, of 500 at most, in which the thumb touches a finger.")
-    lost: int = Field(description="Of these, in which the character's does not.")
-    picture: str = Field(description="SVG: the hand and the character, flat, as a fist, and touching.")
+    lost: int = Field(description="Of these, in which the other's does not.")
+    picture: str = Field(description="SVG: the hand, and how it is shown: flat, as a fist, and touching.")

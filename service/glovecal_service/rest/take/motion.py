@@ -16,11 +16,14 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
+from glovecal_service.exports.character import SUFFIX as CHARACTER
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.exports.motion_file import Body as BodyFile
 from glovecal_service.exports.motion_file import HandTake, MotionFile, fits, write_motion
+from glovecal_service.exports.onto import is_robot
 from glovecal_service.exports.resampling import Resampling
+from glovecal_service.exports.robot_motion import KINDS, SUFFIXES
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
@@ -37,6 +40,8 @@ LIMIT_S = 1800.0
 """An hour of one hand took 4 minutes on two loaded cores."""
 LONGEST_NAME = 50
 """Characters of a file's name, four bytes each at most."""
+MOST_BONES, SHA256_LENGTH = 64, 64
+BoneName = Annotated[str, Field(pattern=r"^[a-z_.]{1,40}$")]
 MarkerNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=4)]
 Shift = Annotated[FiniteFloat, Field(ge=-LARGEST_SHIFT_S, le=LARGEST_SHIFT_S)]
 
@@ -97,10 +102,17 @@ class Motion(StrictBody):
     body: Body | None = Field(
         None, description="Markers of an optical system, joined to the joints in a TRC."
     )
-    onto: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None = Field(
+    onto: Annotated[str, Field(pattern=r"^([0-9a-f]{64}|[a-z]{1,16})$")] | None = Field(
         None,
-        description="A character (.glb) sent to `uploads`: its skeleton moves, found by the names of its "
-        "bones; format glb.",
+        description="A character (.glb) sent to `uploads`, whose skeleton moves, found by the names of its "
+        f"bones: format glb. Or a robot's hand, {', '.join(KINDS)} or its URDF sent to `uploads`: angles of "
+        f"its joints, format {', '.join(suffix[1:] for suffix in SUFFIXES)}.",
+    )
+    bones: dict[BoneName, Annotated[str, Field(max_length=200)]] = Field(
+        default_factory=dict,
+        max_length=MOST_BONES,
+        description="The character's bone, or the robot's link, by the hand's bone (`index_proximal`, or "
+        "`left.index_proximal` for one hand), where another is meant than is found; empty: none.",
     )
 
 
@@ -117,6 +129,8 @@ def list_formats() -> list[MotionFormat]:
             times=one.times,
             accuracy=one.accuracy,
             read_by=one.read_by,
+            characters=one.suffix == CHARACTER,
+            robots=list(KINDS) if one.suffix in SUFFIXES else [],
         )
         for one in FORMATS.values()
     ]
@@ -162,18 +176,26 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
     )
 
 
-@router.post("/character", summary="How well a character shows a motion", responses=change_problems(409))
+@router.post(
+    "/character", summary="How well a character or a robot shows a motion", responses=change_problems(409)
+)
 async def look_at_character(body: Motion, request: Request, parts: PartsNeeded) -> list[CharacterHand]:
     """Which of its bones is which of the hand's, how far its fingertips are from the hand's, and which
-    touches are lost, for each hand of a motion that names a character (`onto`)."""
+    touches are lost, for each hand of a motion that names one (`onto`)."""
     if body.onto is None:
-        raise BadInput("no character is named; send a .glb file to /v1/uploads and name it in onto")
+        raise BadInput(
+            "neither a character nor a robot is named; send its file to /v1/uploads and name it in onto, or "
+            f"one of {', '.join(KINDS)}"
+        )
     answer: list[CharacterHand] = []
 
     def look(cancelled: Cancel) -> None:
-        seen = fits(_asked(parts, body, Path("motion.glb")))
+        seen = fits(_asked(parts, body, Path(f"motion.{body.format}")))
         answer.extend(
-            CharacterHand.model_validate({**vars(one), "missing": list(one.missing)}) for one in seen
+            CharacterHand.model_validate(
+                {**vars(one), "missing": list(one.missing), "choices": list(one.choices)}
+            )
+            for one in seen
         )
 
     await in_time(request, parts, look, limit_s=LIMIT_S, what="this look")
@@ -194,22 +216,24 @@ def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
         if file is None:
             raise NotFound(f"no upload {body.body.upload[:12]}; send the TRC file to /v1/uploads first")
         markers = BodyFile(file, body.body.shift_s, tuple(body.body.right), tuple(body.body.left))
-    character = None
-    if body.onto is not None:
-        character = parts.uploads.find(body.onto)
-        if character is None:
-            raise NotFound(f"no upload {body.onto[:12]}; send the character's .glb to /v1/uploads first")
+    onto: Path | str | None = body.onto
+    if body.onto is not None and len(body.onto) == SHA256_LENGTH:
+        onto = parts.uploads.find(body.onto)
+        if onto is None:
+            raise NotFound(f"no upload {body.onto[:12]}; send the character's or robot's file first")
+    content = "angles" if onto is not None and is_robot(onto) else body.content
     resampling = Resampling(body.rate_hz, body.low_pass_hz)
     return MotionFile(
         tuple(hands),
-        body.content,
+        content,
         path,
         tuple(body.shifts_s),
         body.claps,
         body.wrist,
         markers,
         resampling,
-        character,
+        onto,
+        body.bones,
     )
 
 

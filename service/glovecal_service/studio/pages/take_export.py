@@ -8,17 +8,13 @@ from typing import Any
 
 from nicegui import ui
 
-from glovecal_service.plain import read
-from glovecal_service.rest.take.answer import CharacterHand, MotionFormat, Take
-from glovecal_service.studio.file_button import FileButton
-from glovecal_service.studio.heading import act, heading, main_act
-from glovecal_service.studio.service import refusals
+from glovecal_service.rest.take.answer import MotionFormat, Take
+from glovecal_service.studio.heading import heading, main_act
+from glovecal_service.studio.pages.take_onto import TakeOnto
 from glovecal_service.studio.studio import Studio
-from glovecal_service.studio.table import table, text_row
 
 CONTENTS = {"joints": "Places of joints", "angles": "Angles of joints", "raw": "Readings as they came"}
 LIMIT_S = 1800
-ON_CHARACTERS = "glb"
 SAVE = """
 const answer = await fetch("../v1/motion", {
   method: "POST", headers: {"Content-Type": "application/json"}, body: JSON.stringify(BODY),
@@ -45,8 +41,6 @@ class TakeExport:
             take.id: take.line for take in takes if take.id != own.id and take.known_hand != own.known_hand
         }
         self._model = model
-        self._onto: str | None = None
-        """The upload of a character."""
 
     async def build(self) -> None:
         formats = await self._studio.service.read(list[MotionFormat], "/motion")
@@ -72,17 +66,7 @@ class TakeExport:
                 self._rate = ui.number("Frames a second", min=1, max=1000, placeholder="as recorded")
                 self._low_pass = ui.number("Low-pass filter, Hz", min=0.1, max=450, placeholder="none")
             self._about = ui.label()
-            with ui.element("section").classes("take-character").props('aria-label="Character"') as part:
-                self._character_part = part
-                ui.label(
-                    "The motion moves a body at rest, or a character of your own: a binary glTF file whose "
-                    "hands have bones with common names."
-                )
-                FileButton(
-                    "Choose a character (.glb)", suffixes=".glb", largest=self._studio.largest_file,
-                    take=self._look, tell=self._tell,
-                ).button.props("outline no-caps").classes("studio-target")  # fmt: skip
-                self._fit = ui.element("div").classes("take-character-fit")
+            self._onto = TakeOnto(self._studio, self._body, self._tell)
             with ui.element("div").classes("page-acts"):
                 main_act("Export the motion", self._write)
                 self._busy = ui.spinner()
@@ -95,7 +79,7 @@ class TakeExport:
         able = [key for key in chosen.contents if key == "raw" or self._source.options]
         options = {key: CONTENTS[key] for key in able}
         self._content.set_options(options, value=next(iter(options), None))
-        self._character_part.set_visibility(self._format.value == ON_CHARACTERS)
+        self._onto.show(chosen)
         self._content.set_visibility("raw" in chosen.contents)  # others hold bones, which are both
         self._about.set_text(
             f"In {chosen.unit}; {chosen.axes}. Times: {chosen.times}. Beside the angles: {chosen.accuracy}. "
@@ -106,27 +90,6 @@ class TakeExport:
 
     def _tell(self, sentence: str) -> None:
         self._told.set_text(sentence)
-
-    async def _look(self, name: str, content: bytes) -> None:
-        """How well a character shows this take; it is what moves from then on."""
-        self._fit.clear()
-        self._onto = None
-        self._tell(f"{name} is being looked at.")
-        with refusals(self._tell):
-            kept = await self._studio.service.post_file("/uploads", content, "application/octet-stream")
-            body = self._body() | {"onto": kept["sha256"]}
-            answer = await self._studio.service.post("/motion/character", body)
-            self._onto = kept["sha256"]
-            self._tell(f"{name} will move.")
-            with self._fit:
-                for hand in read(list[CharacterHand], answer):
-                    _show_fit(hand)
-                act("Leave the character out", self._leave_out)
-
-    def _leave_out(self) -> None:
-        self._onto = None
-        self._fit.clear()
-        self._tell("The motion moves a body at rest.")
 
     def _body(self) -> dict[str, Any]:
         takes = [take for take in (self._own.id, self._other.value) if take]
@@ -141,13 +104,12 @@ class TakeExport:
             "file_name": self._own.name,
             "rate_hz": self._rate.value,
             "low_pass_hz": self._low_pass.value,
-            "onto": self._onto if self._format.value == ON_CHARACTERS else None,
         }
 
     async def _write(self) -> None:
         if self._content.value is None:
             return
-        body = self._body()
+        body = self._body() | self._onto.asked
         name = f"{self._own.name}.{self._format.value}"
         code = SAVE.replace("BODY", json.dumps(body)).replace("NAME", json.dumps(name))
         self._told.set_text("The file is being written.")
@@ -158,19 +120,3 @@ class TakeExport:
             return
         self._busy.set_visibility(False)
         self._told.set_text(problem or f"{name} was written: it is among your downloads.")
-
-
-def _show_fit(hand: CharacterHand) -> None:
-    touches = f"{hand.lost} of {hand.touches} touches are lost" if hand.touches else "nothing touches"
-    ui.label(
-        f"{hand.hand.capitalize()} hand: its fingertips are {hand.fingertip_mm:.1f} mm from the hand's, in "
-        f"the hand's size (root mean square over frames and fingers); {touches}."
-    )
-    with ui.element("div").classes("take-character-hand"):
-        ui.html(hand.picture, sanitize=False)  # drawn by the service, with words of its own only
-        with table(f"Which bone is which, {hand.hand} hand", ("Hand", "Character")):
-            for own, bone in hand.bones.items():
-                text_row(own.replace("_", " "), bone)
-    if hand.missing:
-        lacks = ", ".join(name.replace("_", " ") for name in hand.missing)
-        ui.label(f"The character has no {lacks}.")
