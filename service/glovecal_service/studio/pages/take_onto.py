@@ -146,7 +146,7 @@ class TakeOnto:
                 field = ui.select(
                     {"": "none"} | {name: name for name in names}, value=chosen, with_input=True,
                     on_change=partial(self._choose_bone, f"{hand.hand}.{own}"),
-                ).classes("choice")  # fmt: skip
+                ).props("dense options-dense")  # fmt: skip
                 field.props["aria-label"] = f"{own.replace('_', ' ')}, {hand.hand}"
 
     async def _choose_bone(self, key: str, event: events.ValueChangeEventArguments) -> None:
