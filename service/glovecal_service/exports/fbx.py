@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_service.exports.body_motion import BODY_AXES, SKELETAL, BodyMotion, Bone, heads_mm, with_ends
+from glovecal_service.exports.character import NAME
 from glovecal_service.exports.fbx_animation import (
     CONSTANT,
-    NAME,
     TURN,
     Animated,
     Animation,
@@ -48,7 +48,7 @@ def write_fbx(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         ]
         channels = {bone: list(_channels(ids[bone], motion)) for bone, motion in body.by_hand_bone.items()}
         animated = [*turned, *(one for own in channels.values() for one in own)]
-        animation = Animation(ANIMATION, body.time_s - body.time_s[0], animated)
+        animation = Animation(ANIMATION, body.time_s - body.time_s[0], animated, body.notes)
         _write(Records(stream), body, bones, ids, channels, animation)
 
 
@@ -88,6 +88,7 @@ def _write(
         animation.write_connections(records)
     with records.record("Takes"):
         records.leaf("Current", NAME)
+        animation.write_take(records)
     records.end_file()
 
 

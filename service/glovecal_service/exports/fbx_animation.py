@@ -5,20 +5,21 @@ Turns are Euler angles, unrolled, so that between two key frames a bone does not
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from glovecal_service.exports.character import NAME
 from glovecal_service.exports.fbx_records import Compressed, Records
 
 TICKS_PER_S = 46_186_158_000
 CONSTANT, LINEAR = 2, 4
 """What a curve does between key frames."""
 TURN = "Lcl Rotation"
-NAME = "Glovecal take"
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Animation:
     time_s: np.ndarray
     """(N,) since the first frame."""
     animated: Sequence[Animated]
+    notes: Mapping[str, Any]
+    """What it was made of and how."""
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -61,7 +64,8 @@ class Animation:
         with records.object("AnimationStack", self.first, NAME):
             ends = {"Start": np.int64(0), "Stop": self._ticks[-1]}
             rows = [(f"{span}{end}", at) for span in ("Local", "Reference") for end, at in ends.items()]
-            records.properties(*((name, "KTime", "Time", "", at) for name, at in rows))
+            notes = ("glovecal", "KString", "", "U", json.dumps(self.notes))
+            records.properties(*((name, "KTime", "Time", "", at) for name, at in rows), notes)
         with records.object("AnimationLayer", self._layer, NAME):
             pass
         shared = Compressed.of(self._ticks)
@@ -84,6 +88,13 @@ class Animation:
             records.connect(node, one.model, one.property)
             for number, axis in enumerate(one.axes, 1):
                 records.connect(node + np.int64(number), node, f"d|{axis}")
+
+    def write_take(self, records: Records) -> None:
+        """Where old readers look how long it is."""
+        with records.record("Take", NAME):
+            records.leaf("FileName", "Glovecal_take.tak")
+            for span in ("LocalTime", "ReferenceTime"):
+                records.leaf(span, np.int64(0), self._ticks[-1])
 
     @property
     def _layer(self) -> np.int64:
@@ -117,8 +128,6 @@ def euler_curves(
 ) -> np.ndarray:
     """(B, 3, N) degrees of turns (n, B, 3, 3) that come block by block, in a file: by frame as they come, by
     curve as they are written. ``orders``: of each bone, as scipy names them, angles by X, Y and Z."""
-    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
-
     shape = (len(orders), 3, count)
     scratch.truncate(max(4 * int(np.prod(shape)), 1))
     curves = np.memmap(scratch, "<f4", shape=shape)
@@ -127,9 +136,17 @@ def euler_curves(
     for which, block in turns:
         angles = np.empty(block.shape[:3])
         for order, own in alike.items():
-            degrees = Rotation.from_matrix(block[:, own].reshape(-1, 3, 3)).as_euler(order, degrees=True)
-            angles[:, own] = degrees.reshape(-1, len(own), 3)[:, :, ["xyz".index(axis) for axis in order]]
+            degrees = euler_degrees(block[:, own].reshape(-1, 3, 3), order)
+            angles[:, own] = degrees.reshape(-1, len(own), 3)
         unrolled = np.unwrap(np.concatenate([last, angles]), axis=0, period=360.0)
         last = unrolled[-1:]
         curves[:, :, which] = unrolled[1:].transpose(1, 2, 0)
     return curves
+
+
+def euler_degrees(turns: np.ndarray, order: str) -> np.ndarray:
+    """(n, 3) by X, Y and Z of turns (n, 3, 3); ``order``: as scipy names it."""
+    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
+
+    angles = Rotation.from_matrix(turns).as_euler(order, degrees=True)
+    return angles[:, [order.index(axis) for axis in "xyz"]]
