@@ -193,6 +193,11 @@ class BodyMotion:
         """Names of the bones that turn, in the order of ``turns``."""
         return tuple(name for hand in self.hands if hand.degrees is not None for name in hand.bone_names)
 
+    @property
+    def by_hand_bone(self) -> Mapping[str, HandMotion]:
+        """What moves, by the bone that is the whole hand."""
+        return {f"{SIDES[motion.label]}Hand": motion for motion in self.motions}
+
     def turns(self) -> Iterator[tuple[slice, np.ndarray]]:
         """Frames of a block, and (n, B, 3, 3) how each of ``moving`` is turned against its parent."""
         for which in blocks(len(self.time_s)):

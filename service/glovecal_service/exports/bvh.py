@@ -13,7 +13,7 @@ from typing import TextIO
 import numpy as np
 
 from glovecal_service.exports.body_motion import BODY_AXES, SKELETAL, BodyMotion, Bone, even_steps
-from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion, at_times
+from glovecal_service.exports.hand_motion import NO_ROOM, Content, ExportFormat, HandMotion, at_times
 
 MM_PER_UNIT = 10.0
 STEP_DIGITS = 9
@@ -87,6 +87,6 @@ def _rows(line: str, turns: np.ndarray) -> Iterator[str]:
 
 FORMAT = ExportFormat(
     ".bvh", "application/octet-stream", write_bvh, SKELETAL, "BVH",
-    unit="cm", axes=BODY_AXES, times="even steps", accuracy="nothing",
+    unit="cm", axes=BODY_AXES, times="even steps", accuracy=NO_ROOM,
     read_by="Blender, MotionBuilder, Maya, iClone and nearly all others",
 )  # fmt: skip

@@ -1,115 +1,51 @@
-"""A character of an animation tool, as a binary glTF file (.glb): its skeleton, and a take as its animation.
+"""A character of an animation tool: its skeleton, and a take as its animation.
 
 What is written is the character's own file with one animation more: meshes, materials and names stay.
 """
 
 from __future__ import annotations
 
-import json
-import shutil
-import struct
-from collections.abc import Iterator, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.retargeting.bone_names import bones_of
 from glovecal_models.hand.retargeting.retarget import Retargeting
-from glovecal_models.hand.retargeting.rig import Rig, RigBone, hand_of
+from glovecal_models.hand.retargeting.rig import Rig, hand_of
 from glovecal_models.hand.retargeting.touches import Touches
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_service.exports.body_motion import SIDES, continuous_quaternions, whole_angles
-from glovecal_service.exports.gltf import (
-    BINARY_CHUNK,
-    FLOAT,
-    JSON_CHUNK,
-    MAGIC,
-    BinaryNumbers,
-    write_container,
-)
+from glovecal_service.exports.body_motion import SIDES, whole_angles
 from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 
-SUFFIX = ".glb"
-LARGEST_JSON = 64_000_000
 MOST_LISTED = 20_000
 """Nodes of a scene."""
 DEEPEST = 500
-RIGHT = "is it a binary glTF 2.0 file (.glb)? Export the character again"
+LONGEST_NAME = 200
+LARGEST = 1e12
+"""Of a matrix: what is larger is no place of a bone."""
+NAME = "Glovecal take"
+"""Of the animation."""
 
 
-@dataclass(frozen=True)
-class Character:
-    path: Path
-    document: dict[str, Any]
-    begins: int
-    """Where the binary block begins in the file."""
-    length: int
+class Character(ABC):
+    suffix: ClassVar[str]
+    """Of its file, and of what is written."""
 
     @classmethod
+    @abstractmethod
     def read(cls, path: Path, name: str) -> Character:
         """Raises BadInput that names ``name`` and what is wrong with it."""
-        with path.open("rb") as stream:
-            head = stream.read(20)
-            if len(head) < 20 or struct.unpack("<I", head[:4])[0] != MAGIC:
-                raise BadInput(f"{name} does not begin as glTF does; {RIGHT}")
-            length, kind = struct.unpack("<II", head[12:20])
-            if kind != JSON_CHUNK or length > LARGEST_JSON:
-                raise BadInput(f"{name} has no description of its scene, or one of {length} bytes; {RIGHT}")
-            document = read_json(stream.read(length), name)
-            chunk = stream.read(8)
-        if not isinstance(document, dict):
-            raise BadInput(f"{name} describes no scene; {RIGHT}")
-        size, kind = struct.unpack("<II", chunk) if len(chunk) == 8 else (0, BINARY_CHUNK)
-        begins = 20 + length + 8
-        if kind != BINARY_CHUNK or begins + size > path.stat().st_size:
-            raise BadInput(f"{name} is not whole: its numbers are missing; {RIGHT}")
-        return cls(path, document, begins, size)
 
     @cached_property
+    @abstractmethod
     def rig(self) -> Rig:
-        """Nodes in the pose that the file gives them. Raises BadInput for nodes that are no tree."""
-        listed = self.document.get("nodes")
-        if not isinstance(listed, list) or not 0 < len(listed) <= MOST_LISTED:
-            raise BadInput(f"the character has no nodes, or more than {MOST_LISTED}; {RIGHT}")
-        try:
-            return Rig(tuple(self._bones(listed)))
-        except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
-            raise BadInput(f"the character's nodes are not as glTF has them; {RIGHT}") from error
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Of the nodes, by number; each another."""
-        names: list[str] = []
-        taken: set[str] = set()
-        for number, node in enumerate(self.document["nodes"]):
-            name = str(node.get("name") or f"node {number}")[:200]
-            names.append(f"{name} ({number})" if name in taken else name)
-            taken.add(names[-1])
-        return tuple(names)
-
-    def _bones(self, listed: Sequence[Any]) -> Iterator[RigBone]:
-        parents = {child: number for number, node in enumerate(listed) for child in node.get("children", ())}
-        waiting = [(number, 0, np.eye(4)) for number in range(len(listed)) if number not in parents]
-        seen = 0
-        while waiting:
-            number, depth, above = waiting.pop()
-            seen += 1
-            if depth > DEEPEST or seen > len(listed):
-                raise ValueError("no tree")
-            own = above @ _matrix(listed[number])
-            axes = own[:3, :3] / np.linalg.norm(own[:3, :3], axis=0)
-            if not np.isfinite(own).all() or abs(np.linalg.det(axes)) < 0.5:
-                raise ValueError("no turn")
-            parent = parents.get(number)
-            yield RigBone(
-                self.names[number], None if parent is None else self.names[parent], tuple(own[:3, 3]), axes
-            )
-            waiting += [(child, depth + 1, own) for child in listed[number].get("children", ())]
+        """At rest. Raises BadInput for what is no tree of bones."""
 
     def shown(self, skeleton: Skeleton, bones: Mapping[str, str]) -> Touches:
         """Raises BadInput where a hand is not found."""
@@ -128,82 +64,66 @@ class Character:
     ) -> None:
         """Hands on one time, as an animation more. Raises BadInput where a hand is not found, and for another
         format than the character's."""
-        if path.suffix != SUFFIX:
-            raise BadInput(f"a character moves in a {SUFFIX} file, not in {path.suffix}")
-        document = json.loads(json.dumps(self.document))
-        numbers = BinaryNumbers(
-            document.setdefault("accessors", []), document.setdefault("bufferViews", []),
-            self.length + -self.length % 4,
-        )  # fmt: skip
-        time_s = motions[0].time_s - motions[0].time_s[0]
-        times = numbers.add(FLOAT, "SCALAR", time_s, low=[0.0], high=[float(np.float32(time_s[-1]))])
-        channels, samplers, planned = [], [], []
+        if path.suffix != self.suffix:
+            raise BadInput(f"this character moves in a {self.suffix} file, not in {path.suffix}")
         for motion in motions:
             motion.require_angles(content)
-            touches = self.shown(motion.skeleton, bones)
-            rooms = [numbers.room(FLOAT, "VEC4", len(time_s)) for _ in touches.retargeting.names]
-            for name, room in zip(touches.retargeting.names, rooms, strict=True):
-                number = self.names.index(name)
-                _make_turnable(document["nodes"][number])
-                target = {"node": number, "path": "rotation"}
-                channels.append({"sampler": len(samplers), "target": target})
-                samplers.append({"input": times, "output": room, "interpolation": "LINEAR"})
-            planned.append((touches, whole_angles(motion), rooms))
-        notes: dict[str, Any] = {SIDES[motion.label].lower(): dict(motion.notes) for motion in motions}
-        notes["simulated"] = any(motion.simulated for motion in motions)
-        animation = {"name": "Glovecal take", "channels": channels, "samplers": samplers, "extras": notes}
-        document.setdefault("animations", []).append(animation)
-        buffers = document.setdefault("buffers", [{}])
-        buffers[0]["byteLength"] = numbers.length
-        with path.open("wb") as stream:
-            begin = write_container(stream, document, numbers)
-            stream.seek(begin)
-            with self.path.open("rb") as file:
-                file.seek(self.begins)
-                shutil.copyfileobj(_Part(file, self.length), stream)
-            numbers.write(stream, begin)
-            for touches, angles, rooms in planned:
-                for which, quaternions in continuous_quaternions(_turns(touches, angles)):
-                    for bone, room in enumerate(rooms):
-                        numbers.write_at(stream, begin, room, which.start, quaternions[:, bone])
+        hands = [MovingHand(self.shown(one.skeleton, bones), whole_angles(one)) for one in motions]
+        self.write_hands(motions, hands, path)
+
+    @abstractmethod
+    def write_hands(self, motions: Sequence[HandMotion], hands: Sequence[MovingHand], path: Path) -> None:
+        """``hands``: each motion on its hand."""
 
 
-class _Part:
-    """So many bytes of a file, to be copied."""
+@dataclass(frozen=True)
+class MovingHand:
+    """A motion on a character's hand."""
 
-    def __init__(self, stream: Any, length: int) -> None:
-        self._stream, self._left = stream, length
+    touches: Touches
+    angles_deg: np.ndarray
+    """(N, R) finite."""
 
-    def read(self, size: int = -1) -> bytes:
-        content = self._stream.read(self._left if size < 0 else min(size, self._left))
-        self._left -= len(content)
-        return content
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the bones that turn."""
+        return self.touches.retargeting.names
 
+    def turns(self) -> Iterator[tuple[slice, np.ndarray]]:
+        """Frames of a block, and (n, M, 3, 3) of each of ``names`` against its parent."""
+        for which, orientations in self.oriented():
+            yield which, self.touches.retargeting.against_parents(orientations)
 
-def _turns(touches: Touches, angles_deg: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
-    for which in blocks(len(angles_deg)):
-        orientations = touches.orientations(angles_deg[which])
-        yield which, touches.retargeting.against_parents(orientations)
-
-
-def _matrix(node: Any) -> np.ndarray:
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=float).reshape(4, 4).T
-    from scipy.spatial.transform import Rotation  # slow to load, and every command that exports loads this
-
-    matrix = np.eye(4)
-    quaternion = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=float)
-    turned = Rotation.from_quat(quaternion).as_matrix()
-    matrix[:3, :3] = turned * np.array(node.get("scale", (1, 1, 1)), dtype=float)
-    matrix[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=float)
-    return matrix
+    def oriented(self) -> Iterator[tuple[slice, np.ndarray]]:
+        """As ``turns``, in the rig's world."""
+        for which in blocks(len(self.angles_deg)):
+            yield which, self.touches.orientations(self.angles_deg[which])
 
 
-def _make_turnable(node: dict[str, Any]) -> None:
-    """A node that is given as a matrix cannot be animated: its place and size are told apart from its turn,
-    which the animation gives."""
-    if "matrix" in node:
-        matrix = _matrix(node)
-        del node["matrix"]
-        node["translation"] = matrix[:3, 3].tolist()
-        node["scale"] = np.linalg.norm(matrix[:3, :3], axis=0).tolist()
+def notes_of(motions: Sequence[HandMotion]) -> dict[str, Any]:
+    """What an animation was made of, by hand."""
+    notes: dict[str, Any] = {SIDES[motion.label].lower(): dict(motion.notes) for motion in motions}
+    return notes | {"simulated": any(motion.simulated for motion in motions)}
+
+
+def distinct(names: Iterable[str]) -> tuple[str, ...]:
+    """Cut to a length, and each another: of one that is there already with its number."""
+    made: list[str] = []
+    taken: set[str] = set()
+    for number, name in enumerate(names):
+        short = name[:LONGEST_NAME] or f"node {number}"
+        made.append(f"{short} ({number})" if short in taken else short)
+        taken.add(made[-1])
+    return tuple(made)
+
+
+def axes_of(matrix: np.ndarray) -> np.ndarray:
+    """(3, 3) the orientation in a matrix (4, 4) of place, turn and size. Raises ValueError where there is
+    none."""
+    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not (np.abs(matrix) < LARGEST).all() or not sizes.all():
+        raise ValueError("no place, or no size")
+    axes = matrix[:3, :3] / sizes
+    if abs(np.linalg.det(axes)) < 0.5:
+        raise ValueError("no turn")
+    return axes

@@ -1,9 +1,9 @@
 """glTF 2.0, binary (.glb): skeleton, skin and animation in one file for viewers and engines; metres.
 
 The file is JSON and one block of binary numbers, written here block by block, as what is exported may be
-hours long. Standard deviations, frame by frame, are numbers of their own, which the animation's ``extras``
-name. Each bone is drawn as an octahedron, so that a viewer shows the hands. Key frames stand at the
-frames' own times.
+hours long. Standard deviations and flags, frame by frame, are numbers of their own, which the animation's
+``extras`` name; -1 where a deviation is not known. Each bone is drawn as an octahedron, so that a viewer
+shows the hands. Key frames stand at the frames' own times.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ from glovecal_service.exports.body_motion import (
     heads_mm,
     with_ends,
 )
-from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion
+from glovecal_service.exports.hand_motion import ALL_CHANNELS, Content, ExportFormat, HandMotion
 
 MM_PER_UNIT = 1000.0
 MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
+VERTICES, CORNERS = 34962, 34963
+"""What a viewer hands to the graphics card: a view of vertices, or of the corners of triangles."""
 UNSIGNED_BYTE, UNSIGNED_SHORT, FLOAT = 5121, 5123, 5126
 _SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TYPES = {UNSIGNED_BYTE: "<u1", UNSIGNED_SHORT: "<u2", FLOAT: "<f4"}
@@ -53,13 +55,7 @@ def write_gltf(motions: Sequence[HandMotion], content: Content, path: Path) -> N
         for number, bone in enumerate(body.moving)
     ]
     samplers = [{"input": times, "output": one, "interpolation": "LINEAR"} for one in turns]
-    deviations = {
-        SIDES[motion.label].lower(): {
-            "rotations": list(motion.rotations),
-            "sd_deg": numbers.add(FLOAT, "SCALAR", motion.sd_deg.reshape(-1)),
-        }
-        for motion in body.motions
-    }
+    channels_by_hand = {SIDES[motion.label].lower(): channels_of(motion, numbers) for motion in body.motions}
     skin_node = len(bones)
     document = {
         "asset": {"version": "2.0", "generator": "Glovecal", "extras": body.notes},
@@ -75,7 +71,12 @@ def write_gltf(motions: Sequence[HandMotion], content: Content, path: Path) -> N
             }
         ],
         "animations": [
-            {"name": "take", "channels": channels, "samplers": samplers, "extras": {"glovecal": deviations}}
+            {
+                "name": "take",
+                "channels": channels,
+                "samplers": samplers,
+                "extras": {"glovecal": channels_by_hand},
+            }
         ],
         "accessors": numbers.accessors,
         "bufferViews": numbers.views,
@@ -86,6 +87,17 @@ def write_gltf(motions: Sequence[HandMotion], content: Content, path: Path) -> N
         for which, quaternions in continuous_quaternions(body.turns()):
             for bone, accessor in enumerate(turns):
                 numbers.write_at(stream, begin, accessor, which.start, quaternions[:, bone])
+
+
+def channels_of(motion: HandMotion, numbers: BinaryNumbers) -> dict[str, Any]:
+    """What ``extras`` say of the numbers beside the angles: rotations, and of each channel its accessor."""
+    kept = {
+        channel.key: numbers.add(
+            UNSIGNED_BYTE if channel.is_held else FLOAT, "SCALAR", channel.numbers.reshape(-1)
+        )
+        for channel in motion.channels
+    }
+    return {"rotations": list(motion.rotations), **kept}
 
 
 def write_container(stream: BinaryIO, document: Mapping[str, Any], numbers: BinaryNumbers) -> int:
@@ -125,6 +137,8 @@ def _mesh(bones: Sequence[Bone], numbers: BinaryNumbers) -> dict[str, Any]:
         "WEIGHTS_0": numbers.add(FLOAT, "VEC4", np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))),
     }
     indices = numbers.add(UNSIGNED_SHORT, "SCALAR", faces.reshape(-1))
+    for accessor, target in (*((one, VERTICES) for one in attributes.values()), (indices, CORNERS)):
+        numbers.view_of(accessor)["target"] = target
     return {"name": "Bones", "primitives": [{"attributes": attributes, "indices": indices}]}
 
 
@@ -175,11 +189,14 @@ class BinaryNumbers:
         stream.write(content.tobytes())
 
     def _offset(self, number: int) -> int:
-        return self.views[self.accessors[number]["bufferView"]]["byteOffset"]
+        return self.view_of(number)["byteOffset"]
+
+    def view_of(self, number: int) -> dict[str, Any]:
+        return self.views[self.accessors[number]["bufferView"]]
 
 
 FORMAT = ExportFormat(
     ".glb", "model/gltf-binary", write_gltf, SKELETAL, "glTF 2.0, binary",
-    unit="m", axes=BODY_AXES, times="the frames' own, to 32 bits", accuracy="standard deviations",
+    unit="m", axes=BODY_AXES, times="the frames' own, to 32 bits", accuracy=ALL_CHANNELS,
     read_by="viewers in browsers, Blender, Godot, Unity, Unreal",
 )  # fmt: skip

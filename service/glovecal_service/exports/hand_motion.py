@@ -22,6 +22,38 @@ SAME_S = 1e-6
 FRAMES_AT_ONCE = 4096
 
 
+ALL_CHANNELS, NO_ROOM = "standard deviations and flags", "nothing: it has no room for them"
+"""What a format holds beside the angles."""
+NOT_KNOWN = -1.0
+"""Where a format has numbers only: neither a deviation nor flags are ever negative."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What travels beside a hand's angles: a number a frame and rotation."""
+
+    name: str
+    unit: str
+    """Empty for flags."""
+    values: np.ndarray
+    """(N, R); NaN where not known."""
+
+    @property
+    def key(self) -> str:
+        """Name and unit."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+    @property
+    def is_held(self) -> bool:
+        """Bits, between which nothing is interpolated."""
+        return self.values.dtype.kind != "f"
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """(N, R) without a NaN."""
+        return self.values if self.is_held else np.nan_to_num(self.values, nan=NOT_KNOWN)
+
+
 @dataclass(frozen=True)
 class HandMotion:
     """N frames of one hand, of S sensors and R calibrated rotations."""
@@ -53,6 +85,12 @@ class HandMotion:
     """With "optical" the glove's wrist angles are ignored: the frame is that of the hand itself."""
     beside: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Other markers, (N, 3) by name, mm, to be written with the hand."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Beside the angles, for formats that can hold them."""
+        deviations = Channel("sd", "deg", self.sd_deg)
+        return (deviations,) if self.flags is None else (deviations, Channel("flags", "", self.flags))
 
     def frames(self, which: slice) -> HandMotion:
         """Some of the frames."""

@@ -20,7 +20,15 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, WRIST, completed
 from glovecal_models.takes.write_table import SIMULATED_CONTEXT, write_columns
-from glovecal_service.exports.hand_motion import CONTENTS, Content, ExportFormat, HandMotion, blocks
+from glovecal_service.exports.hand_motion import (
+    ALL_CHANNELS,
+    CONTENTS,
+    NO_ROOM,
+    Content,
+    ExportFormat,
+    HandMotion,
+    blocks,
+)
 
 HAND_AXES = "of the forearm: x to the fingers, y to the right hand's thumb, z out of the back of the hand"
 TRIPLES: dict[str, tuple[str, ...]] = {
@@ -150,7 +158,7 @@ def _rows(time_s: np.ndarray, found: Mapping[str, np.ndarray], first: int) -> It
 
 TRC = ExportFormat(
     ".trc", "text/tab-separated-values", write_trc, CONTENTS, "TRC",
-    unit="mm", axes=HAND_AXES, times="the frames' own", accuracy="nothing", read_by="OpenSim, MotionBuilder",
+    unit="mm", axes=HAND_AXES, times="the frames' own", accuracy=NO_ROOM, read_by="OpenSim, MotionBuilder",
 )  # fmt: skip
 
 
@@ -186,9 +194,8 @@ def _columns(motion: HandMotion, content: Content) -> dict[str, np.ndarray]:
     prefix = "r" if motion.measured else "p"
     columns: dict[str, np.ndarray] = {}
     for number, name in enumerate(motion.rotations):
-        columns |= {f"{prefix}.{name}": motion.degrees[:, number], f"sd.{name}": motion.sd_deg[:, number]}
-        if motion.flags is not None:
-            columns[f"flags.{name}"] = motion.flags[:, number]
+        columns[f"{prefix}.{name}"] = motion.degrees[:, number]
+        columns |= {f"{channel.name}.{name}": channel.values[:, number] for channel in motion.channels}
     return columns
 
 
@@ -196,7 +203,7 @@ CSV, PARQUET = (
     ExportFormat(
         suffix, media_type, write_table, CONTENTS, name,
         unit="mm, degrees", axes=HAND_AXES, times="the frames' own",
-        accuracy="standard deviations and flags", read_by=read_by,
+        accuracy=ALL_CHANNELS, read_by=read_by,
     )
     for suffix, media_type, name, read_by in (
         (".csv", "text/csv", "CSV", "spreadsheets, pandas, R, MATLAB"),

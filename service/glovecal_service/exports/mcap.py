@@ -1,7 +1,8 @@
 """MCAP, the recording of robotics: joint states as ROS 2 sends them (extra ``mcap``).
 
 One topic a hand with ``sensor_msgs/msg/JointState``, as the live bridge sends it, and one with the same
-message whose positions are standard deviations. Radians; an angle that is not known is left out.
+message for each of standard deviations and flags as positions. Angles and deviations are radians; what is
+not known is left out.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import numpy as np
 
 from glovecal_service.bridges.ros2 import joint_state
 from glovecal_service.exports.body_motion import SIDES
-from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion
+from glovecal_service.exports.hand_motion import ALL_CHANNELS, Content, ExportFormat, HandMotion
 
 CHUNK_BYTES = 1 << 15
 """That are held until they are written."""
+TOPICS = {"sd": "deviations", "flags": "flags"}
 TYPE = "sensor_msgs/msg/JointState"
 _BETWEEN = "=" * 80
 DEFINITION = f"""std_msgs/Header header
@@ -48,9 +50,14 @@ def write_mcap(motions: Sequence[HandMotion], content: Content, path: Path) -> N
         channels = []
         for motion in motions:
             side = SIDES[motion.label].lower()
+            topics = {"joint_states": np.radians(motion.degrees)}
+            topics |= {
+                TOPICS[channel.name]: np.radians(channel.values) if channel.unit else channel.values
+                for channel in motion.channels
+            }
             channels += [
                 (writer.register_channel(f"/glovecal/{side}/{topic}", "cdr", schema), motion, values, side)
-                for topic, values in (("joint_states", motion.degrees), ("deviations", motion.sd_deg))
+                for topic, values in topics.items()
             ]
             notes = {"simulated": str(motion.simulated)}
             notes |= {name: str(value) for name, value in motion.notes.items()}
@@ -58,12 +65,8 @@ def write_mcap(motions: Sequence[HandMotion], content: Content, path: Path) -> N
         time_ns = np.round((motions[0].time_s - motions[0].time_s[0]) * 1e9).astype(np.int64).tolist()
         for frame, at_ns in enumerate(time_ns):
             for channel, motion, values, side in channels:
-                radians = np.radians(values[frame])
-                known = {
-                    name: angle
-                    for name, angle in zip(motion.rotations, radians.tolist(), strict=True)
-                    if angle == angle
-                }
+                row = zip(motion.rotations, values[frame].tolist(), strict=True)
+                known = {name: float(value) for name, value in row if value == value}
                 writer.add_message(channel, at_ns, joint_state(at_ns, side, known), at_ns, frame)
         writer.finish()
 
@@ -71,5 +74,5 @@ def write_mcap(motions: Sequence[HandMotion], content: Content, path: Path) -> N
 FORMAT = ExportFormat(
     ".mcap", "application/octet-stream", write_mcap, ("angles",), "MCAP (sensor_msgs/JointState)",
     unit="radians", axes="none: angles by name", times="the frames' own",
-    accuracy="standard deviations", read_by="Foxglove, ros2 bag, rerun", needs=("mcap", "mcap"),
+    accuracy=ALL_CHANNELS, read_by="Foxglove, ros2 bag, rerun", needs=("mcap", "mcap"),
 )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.names import did_you_mean
-from glovecal_service.exports.character import Character
+from glovecal_service.exports.character_files import read_character
 from glovecal_service.exports.hand_motion import Content, HandMotion
 from glovecal_service.exports.robot_motion import KINDS, Robot
 
@@ -80,4 +80,4 @@ def read_onto(onto: Path | str) -> Onto:
         return Robot(onto)
     if is_robot(onto):
         return Robot.read(onto, "the robot's file")
-    return Character.read(onto, "the character's file")
+    return read_character(onto, "the character's file")

@@ -1,4 +1,5 @@
-"""USD as text (.usda): a UsdSkel skeleton and its animation, with standard deviations beside it; centimetres.
+"""USD as text (.usda): a UsdSkel skeleton and its animation, with standard deviations and flags beside it;
+centimetres.
 
 Text needs no library, and programs turn it into their own binary form. Time samples stand at the frames' own
 times.
@@ -24,7 +25,14 @@ from glovecal_service.exports.body_motion import (
     heads_mm,
     with_ends,
 )
-from glovecal_service.exports.hand_motion import Content, ExportFormat, HandMotion, blocks
+from glovecal_service.exports.hand_motion import (
+    ALL_CHANNELS,
+    Channel,
+    Content,
+    ExportFormat,
+    HandMotion,
+    blocks,
+)
 
 MM_PER_UNIT = 10.0
 HEAD = """#usda 1.0
@@ -61,11 +69,14 @@ def SkelRoot "Hands" (
             half3[] scales = [{scales}]
             quatf[] rotations.timeSamples = {{
 """
-BETWEEN = """            }}
+ROTATIONS = """\
             custom uniform token[] glovecal:{side}:rotations = [{names}]
-            custom float[] glovecal:{side}:sdDegrees.timeSamples = {{
 """
-FOOT = """            }}
+CHANNEL = """\
+            custom {kind}[] glovecal:{side}:{key}.timeSamples = {{
+"""
+SAMPLES_END = "            }\n"
+FOOT = """\
         }}
     }}
 
@@ -114,17 +125,20 @@ def write_usd(motions: Sequence[HandMotion], content: Content, path: Path) -> No
             )
         )  # fmt: skip
         turn = "({:.9g}, {:.9g}, {:.9g}, {:.9g})"
-        turn = "({:.9g}, {:.9g}, {:.9g}, {:.9g})"
         line = f"                {{!r}}: [{', '.join([turn] * len(moving))}],\n"
         for which, quaternions in continuous_quaternions(body.turns()):
             rows = np.roll(quaternions, 1, axis=2).reshape(len(quaternions), -1).tolist()
             stream.writelines(
                 line.format(code, *row) for code, row in zip(codes[which].tolist(), rows, strict=True)
             )
+        stream.write(SAMPLES_END)
         for motion in motions:
             side = SIDES[motion.label].lower()
-            stream.write(BETWEEN.format(side=side, names=_quoted(motion.rotations)))
-            _write_deviations(stream, codes, motion)
+            stream.write(ROTATIONS.format(side=side, names=_quoted(motion.rotations)))
+            for channel in motion.channels:
+                kind = "int" if channel.is_held else "float"
+                stream.write(CHANNEL.format(kind=kind, side=side, key=channel.key))
+                _write_channel(stream, codes, channel)
         stream.write(
             FOOT.format(
                 points=_tuples(points / MM_PER_UNIT), counts=", ".join(["3"] * len(faces)),
@@ -134,14 +148,15 @@ def write_usd(motions: Sequence[HandMotion], content: Content, path: Path) -> No
         )  # fmt: skip
 
 
-def _write_deviations(stream: TextIO, codes: np.ndarray, motion: HandMotion) -> None:
-    """``nan`` where nothing is known."""
+def _write_channel(stream: TextIO, codes: np.ndarray, channel: Channel) -> None:
+    numbers = channel.numbers
     for which in blocks(len(codes)):
-        rows = zip(codes[which].tolist(), motion.sd_deg[which].tolist(), strict=True)
+        rows = zip(codes[which].tolist(), numbers[which].tolist(), strict=True)
         stream.writelines(
             f"                {code!r}: [{', '.join(f'{value:.6g}' for value in row)}],\n"
             for code, row in rows
         )
+    stream.write(SAMPLES_END)
 
 
 def _paths(bones: Sequence[Bone]) -> dict[str, str]:
@@ -171,6 +186,6 @@ def _shifts(offsets_mm: Iterable[Sequence[float] | np.ndarray]) -> str:
 
 FORMAT = ExportFormat(
     ".usda", "model/vnd.usda", write_usd, SKELETAL, "USD (UsdSkel) as text",
-    unit="cm", axes=BODY_AXES, times="the frames' own", accuracy="standard deviations",
+    unit="cm", axes=BODY_AXES, times="the frames' own", accuracy=ALL_CHANNELS,
     read_by="Houdini, Omniverse, Blender, Maya, Unreal",
 )  # fmt: skip

@@ -23,14 +23,14 @@ from test_skeleton_formats import read_glb
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import HandBones
 from glovecal_models.hand.retargeting.rig import hand_of
-from glovecal_service.exports.character import Character
 from glovecal_service.exports.character_fit import CharacterFit
+from glovecal_service.exports.gltf_character import GltfCharacter
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_its_bones_point_where_the_hands_point(tmp_path: Path, convention: str) -> None:
     write_character(tmp_path / "character.glb", convention)
-    character = Character.read(tmp_path / "character.glb", "character.glb")
+    character = GltfCharacter.read(tmp_path / "character.glb", "character.glb")
     hands = [moving("R"), moving("L")]
     for hand in hands:  # a thumb that touches nothing: near a touch joints are turned further
         hand.degrees[:] = np.clip(hand.degrees, 0, 40)
@@ -57,7 +57,7 @@ def test_its_bones_point_where_the_hands_point(tmp_path: Path, convention: str) 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_how_well_it_fits_is_told(tmp_path: Path, convention: str) -> None:
     write_character(tmp_path / "character.glb", convention)
-    character = Character.read(tmp_path / "character.glb", "character.glb")
+    character = GltfCharacter.read(tmp_path / "character.glb", "character.glb")
     motion = moving("L", count=800)
     fit = CharacterFit.of(motion, character.shown(motion.skeleton, {}))
     assert fit.bones["index_proximal"] == hand_of(character.rig, "left")["index_proximal"]
@@ -73,14 +73,16 @@ def test_a_character_of_the_hands_own_size_is_exact(tmp_path: Path) -> None:
 
     motion = moving("R", count=50)
     FORMATS[".glb"].write([motion], "joints", tmp_path / "own.glb")
-    fit = CharacterFit.of(motion, Character.read(tmp_path / "own.glb", "own.glb").shown(motion.skeleton, {}))
+    fit = CharacterFit.of(
+        motion, GltfCharacter.read(tmp_path / "own.glb", "own.glb").shown(motion.skeleton, {})
+    )
     assert fit.fingertip_mm < 0.05
     assert fit.lost == 0
 
 
 def test_a_node_given_as_a_matrix_is_animated_all_the_same(tmp_path: Path) -> None:
     write_character(tmp_path / "plain.glb", "mixamo")
-    plain = Character.read(tmp_path / "plain.glb", "plain.glb")
+    plain = GltfCharacter.read(tmp_path / "plain.glb", "plain.glb")
     number = plain.names.index("mixamorig:RightHandIndex1")
     document = json.loads(json.dumps(plain.document))
     node = document["nodes"][number]
@@ -122,7 +124,7 @@ def container(document: object) -> bytes:
 def test_what_is_no_character_is_refused(tmp_path: Path, content: bytes, why: str) -> None:
     (tmp_path / "odd.glb").write_bytes(content)
     with pytest.raises(BadInput, match=why):
-        Character.read(tmp_path / "odd.glb", "odd.glb").write(
+        GltfCharacter.read(tmp_path / "odd.glb", "odd.glb").write(
             [moving("L")], "joints", tmp_path / "out.glb", {}
         )
 
@@ -140,7 +142,7 @@ def test_whatever_nodes_are_they_are_a_rig_or_refused(tmp_path_factory, document
     path.write_bytes(container(document))
     refused = ""
     try:
-        bones = Character.read(path, "wild.glb").rig.bones
+        bones = GltfCharacter.read(path, "wild.glb").rig.bones
     except BadInput as error:
         refused = str(error)
     else:

@@ -14,7 +14,7 @@ import trc
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "exports"))
 
-from characters import write_character
+from characters import write_character, write_fbx_character
 
 from glovecal_client.rest import Refused, RestClient
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -139,8 +139,13 @@ def test_a_character_is_told_of_and_moved(client: RestClient, tmp_path: Path) ->
     document: Any = pygltflib.GLTF2.load_binary(str(tmp_path / "moved.glb"))
     moved = {document.nodes[channel.target.node].name for channel in document.animations[0].channels}
     assert "index_01_r" in moved
-    with pytest.raises(Refused, match=r"a character moves in a \.glb file, not in \.fbx"):
+    with pytest.raises(Refused, match=r"this character moves in a \.glb file, not in \.fbx"):
         client.made("/motion", body | {"format": "fbx"})
+    write_fbx_character(tmp_path / "hero.fbx", "mixamo")
+    body |= {"onto": client.upload(tmp_path / "hero.fbx"), "format": "fbx"}
+    [fit] = client.post("/motion/character", body)
+    assert fit["bones"]["index_proximal"] == "mixamorig:RightHandIndex1"
+    assert b"Glovecal take" in client.made("/motion", body)
     other = client.upload(write_nothing(tmp_path))
     with pytest.raises(Refused, match="does not begin as glTF does"):
         client.post("/motion/character", body | {"onto": other})

@@ -111,8 +111,8 @@ def motion(
         str | None,
         typer.Option(
             metavar="FILE|ROBOT",
-            help="A character (.glb) whose skeleton is to move; or a robot's hand, shadow, allegro, leap or "
-            "its URDF, whose joint angles are written.",
+            help="A character (.glb, .fbx) whose skeleton is to move; or a robot's hand, shadow, allegro, "
+            "leap or its URDF, whose joint angles are written.",
         ),
     ] = None,
     bone: Annotated[

@@ -16,7 +16,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
-from glovecal_service.exports.character import SUFFIX as CHARACTER
+from glovecal_service.exports.character_files import SUFFIXES as CHARACTERS
 from glovecal_service.exports.formats import FORMATS, format_of
 from glovecal_service.exports.hand_motion import Content
 from glovecal_service.exports.motion_file import Body as BodyFile
@@ -104,9 +104,10 @@ class Motion(StrictBody):
     )
     onto: Annotated[str, Field(pattern=r"^([0-9a-f]{64}|[a-z]{1,16})$")] | None = Field(
         None,
-        description="A character (.glb) sent to `uploads`, whose skeleton moves, found by the names of its "
-        f"bones: format glb. Or a robot's hand, {', '.join(KINDS)} or its URDF sent to `uploads`: angles of "
-        f"its joints, format {', '.join(suffix[1:] for suffix in SUFFIXES)}.",
+        description=f"A character ({', '.join(CHARACTERS)}) sent to `uploads`, whose skeleton moves, found "
+        f"by the names of its bones: in the format that it has. Or a robot's hand, {', '.join(KINDS)} or "
+        "its URDF sent to `uploads`: angles of its joints, format "
+        f"{', '.join(suffix[1:] for suffix in SUFFIXES)}.",
     )
     bones: dict[BoneName, Annotated[str, Field(max_length=200)]] = Field(
         default_factory=dict,
@@ -129,7 +130,7 @@ def list_formats() -> list[MotionFormat]:
             times=one.times,
             accuracy=one.accuracy,
             read_by=one.read_by,
-            characters=one.suffix == CHARACTER,
+            characters=one.suffix in CHARACTERS,
             robots=list(KINDS) if one.suffix in SUFFIXES else [],
         )
         for one in FORMATS.values()

@@ -66,7 +66,7 @@ class TakeExport:
                 self._rate = ui.number("Frames a second", min=1, max=1000, placeholder="as recorded")
                 self._low_pass = ui.number("Low-pass filter, Hz", min=0.1, max=450, placeholder="none")
             self._about = ui.label()
-            self._onto = TakeOnto(self._studio, self._body, self._tell)
+            self._onto = TakeOnto(self._studio, formats, self._body, self._tell)
             with ui.element("div").classes("page-acts"):
                 main_act("Export the motion", self._write)
                 self._busy = ui.spinner()

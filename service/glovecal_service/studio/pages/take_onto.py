@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -21,9 +21,13 @@ class TakeOnto:
     """Build it inside the part of the page where it belongs; ``show`` it for a format."""
 
     def __init__(
-        self, studio: Studio, motion: Callable[[], dict[str, Any]], tell: Callable[[str], None]
+        self,
+        studio: Studio,
+        formats: Iterable[MotionFormat],
+        motion: Callable[[], dict[str, Any]],
+        tell: Callable[[str], None],
     ) -> None:
-        """``motion``: what is asked for, without what this part adds."""
+        """``formats``: all that there are; ``motion``: what is asked for, without what this part adds."""
         self._studio, self._motion, self._tell = studio, motion, tell
         self._onto: str | None = None
         """An upload, or a robot's name."""
@@ -37,7 +41,11 @@ class TakeOnto:
             with ui.row().classes("choices"):
                 self._robot = ui.select({}, value=None, label="Robot hand", on_change=self._choose_robot)
                 self._robot.classes("choice")
-                self._character = self._file_button("Choose a character (.glb)", ".glb")
+                self._characters = {
+                    one.format: self._file_button(f"Choose a character (.{one.format})", f".{one.format}")
+                    for one in formats
+                    if one.characters
+                }
                 self._urdf = self._file_button("Choose a robot (.urdf)", ".urdf,.xml")
             self._fit = ui.element("div").classes("take-character-fit")
 
@@ -49,19 +57,20 @@ class TakeOnto:
         """What was chosen for a format of another kind is left out."""
         before, self._format = self._format, format
         self._part.set_visibility(bool(format.robots or format.characters))
-        self._character.set_visibility(bool(format.characters))
+        for key, button in self._characters.items():
+            button.set_visibility(key == format.format)
         for each in (self._robot, self._urdf):
             each.set_visibility(bool(format.robots))
         self._about.set_text(
             "The joint angles of a robot's hand can be written in place of the person's own: of one that is "
             "known, or of your own by its URDF."
             if format.robots
-            else "The motion moves a body at rest, or a character of your own: a binary glTF file whose "
-            "hands have bones with common names."
+            else "The motion moves a body at rest, or a character of your own: a binary file of the same "
+            "format whose hands have bones with common names."
         )
         robots = {name: name.capitalize() for name in format.robots}
         self._robot.set_options({"": "none"} | robots, value="")
-        if before is not None and before.characters != format.characters:
+        if before is not None and _kind(before) != _kind(format):
             self._leave_out("")
 
     def _file_button(self, text: str, suffixes: str) -> ui.button:
@@ -152,3 +161,8 @@ class TakeOnto:
     async def _choose_bone(self, key: str, event: events.ValueChangeEventArguments) -> None:
         self._bones[key] = event.value or ""
         await self._look_again()
+
+
+def _kind(format: MotionFormat) -> str:
+    """What can be chosen for it."""
+    return format.format if format.characters else "robot" if format.robots else ""
