@@ -98,9 +98,7 @@ def main() -> int:
         rms = float(np.sqrt((np.concatenate(away) ** 2).mean()))
         found[name] = {"fingertip_rms_mm": rms, "touches": counts.tolist()}
         print(f"| {name} | {rms:.1f} | {counts[1]}, {counts[2]} of {counts[0]} |")
-    print(
-        "\n| robot | fingertips, mm | bones, degrees (median; thumb) | touches lost | ms a frame, live |"
-    )
+    print("\n| robot | fingertips, mm | bones, degrees (median; thumb) | touches lost | ms a frame, live |")
     print("|---|---|---|---|---|")
     for name in known_robots():
         found[name] = _robot(name, drawn)

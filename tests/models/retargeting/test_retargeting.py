@@ -253,3 +253,35 @@ def test_what_cannot_be_mapped_is_said() -> None:
     flat = Rig(tuple(replace(bone, head=(0.0, 0.0, 0.0)) for bone in rig.bones))
     with pytest.raises(BadInput, match="no direction from the wrist"):
         Retargeting.of(hand_skeleton(), flat, mapping)
+
+
+@pytest.mark.parametrize(
+    ("first", "pattern"),
+    [
+        (1, "{side}Finger{number}{part}"),
+        (0, "Bip01 {letter} Finger{number}{place}"),
+        (1, "{letter}_digit_{number}_{part}"),
+    ],
+)  # fmt: skip
+@each_hand
+def test_fingers_that_are_numbered_are_counted_from_the_thumb(hand, first: int, pattern: str) -> None:
+    """As in Rokoko's character and in 3ds Max's Biped."""
+    rig = rig_like(CONVENTIONS["unreal"], hand)
+    named = hand_of(rig, hand)
+    new = {named[HAND]: f"{hand.capitalize()}Hand"}
+    for number, (finger, parts) in enumerate(PHALANGES.items(), first):
+        for place, part in enumerate(parts):
+            new[named[f"{finger}_{part}"]] = pattern.format(
+                side=hand.capitalize(), letter=hand[0].upper(), number=number, part=part, place=place or ""
+            )
+    bones = tuple(
+        replace(bone, name=new.get(bone.name, bone.name), parent=new.get(bone.parent or "", bone.parent))
+        for bone in rig.bones
+        if "metacarpal" not in bone.name
+    )
+    bones = tuple(
+        bone if bone.parent is None or any(bone.parent == each.name for each in bones)
+        else replace(bone, parent=f"{hand.capitalize()}Hand")
+        for bone in bones
+    )  # fmt: skip
+    assert hand_of(Rig(bones), hand) == {own: new[name] for own, name in named.items()}

@@ -1,7 +1,7 @@
 """Another skeleton in its rest pose: where its bones are and how they stand, and which are a hand's.
 
-Bones are found by their names, whatever the convention: a side (left, right, l, r), a finger, and either a
-number or the anatomical word. What a number means is not trusted: some rigs count from the knuckle, others
+Bones are found by their names, whatever the convention: a side (left, right, l, r), a finger (by its name, or
+all five numbered from the thumb on), and either a number or the anatomical word. What a number means is not trusted: some rigs count from the knuckle, others
 from the metacarpal, and some give the fingertip a bone. The chain and where it begins tell.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ _HANDS = ("hand", "wrist")
 _TIPS = ("tip", "end", "nub")
 _PALM = ("metacarpal", "palm", "carpal")
 _HELPERS = ("twist", "ik", "pole", "weapon", "gun", "prop", "socket", "roll", "master", "mch", "org", "ctrl")
+_NUMBERED = re.compile(r"(?:finger|digit)[ _.-]?(\d)", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
 
@@ -75,6 +76,8 @@ class _Named:
     finger: str | None
     is_tip: bool
     is_hand: bool
+    number: str | None = None
+    """Of a finger that has no name."""
 
 
 def _read(bone: RigBone) -> _Named | None:
@@ -84,9 +87,11 @@ def _read(bone: RigBone) -> _Named | None:
         return None
     side: Handedness | None = next((_SIDES[word] for word in words if word in _SIDES), None)
     finger = next((_FINGERS[word] for word in words if word in _FINGERS), None)
+    numbered = _NUMBERED.search(bone.name) if finger is None else None
     return _Named(
         bone, side, finger, any(word in _TIPS for word in words),
-        finger is None and any(word in _HANDS for word in words),
+        finger is None and numbered is None and any(word in _HANDS for word in words),
+        None if numbered is None else numbered[1],
     )  # fmt: skip
 
 
@@ -94,8 +99,10 @@ def hand_of(rig: Rig, hand: Handedness) -> dict[str, str]:
     """Which of the rig's bones is which of a hand's, by the names of ``hand.bones``; what it lacks is left
     out. Raises BadInput where no hand of that side is there, or fewer than three fingers."""
     named = [each for each in map(_read, rig.bones) if each is not None]
-    sides = {each.side for each in named if each.finger is not None}
-    own = [each for each in named if each.side == hand or (sides == {None} and each.side is None)]
+    sides = {each.side for each in named if each.finger is not None or each.number is not None}
+    own = _numbers_named(
+        [each for each in named if each.side == hand or (sides == {None} and each.side is None)]
+    )
     wrists = [each.bone for each in own if each.is_hand]
     chains = {finger: _chain(rig, [each for each in own if each.finger == finger]) for finger in PHALANGES}
     wrist = next((bone for bone in wrists if _carries(rig, bone, chains["middle"] or chains["index"])), None)
@@ -116,6 +123,15 @@ def hand_of(rig: Rig, hand: Handedness) -> dict[str, str]:
             "say which bone is which"
         )
     return mapping
+
+
+def _numbers_named(own: list[_Named]) -> list[_Named]:
+    """Five numbers, from 0 or from 1 on, are the five fingers from the thumb on (3ds Max's Biped, Rokoko)."""
+    numbers = sorted({each.number for each in own if each.number is not None})
+    if len(numbers) != len(PHALANGES) or any(each.finger is not None for each in own):
+        return own
+    fingers = dict(zip(numbers, PHALANGES, strict=True))
+    return [replace(each, finger=fingers.get(each.number or "")) for each in own]
 
 
 def _chain(rig: Rig, bones: Iterable[_Named]) -> list[RigBone]:
