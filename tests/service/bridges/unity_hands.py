@@ -18,9 +18,9 @@ def in_unity(
     bones = HandBones.of(worn.skeleton)
     turned = bones.orientations(np.array([[{**FLAT, **angles}[name] for name in HAND_ROTATIONS]]))[0]
     in_hand, to_unity = turned[0].T @ turned, TO_UNITY[worn.hand]
-    found = {}
+    directions = {}
     for finger, parts in PHALANGES.items():
         for number, part in enumerate(parts):
             axes = in_hand[bones.names.index(f"{finger}_{part}")]
-            found[finger, number] = to_unity(axes[:, 0]), to_unity(axes[:, 2])
-    return found
+            directions[finger, number] = to_unity(axes[:, 0]), to_unity(axes[:, 2])
+    return directions
