@@ -187,7 +187,7 @@ def read_ltc(path: Path, *, rate: str | None = None, channel: int | None = None)
             f"{path.name} holds no time code (LTC) in {_channel_names(channel, channels.shape[1])}: is it "
             "the sound of the time code, recorded loud enough?"
         )
-    return _reading(frames, rate, path.name, best + 1)
+    return reading_of(frames, rate, path.name, best + 1)
 
 
 def _channel_names(channel: int | None, channels: int) -> str:
@@ -212,17 +212,24 @@ def _channels(path: Path) -> tuple[np.ndarray, int]:
             f"{path.name} has {8 * width}-bit samples, {samples_per_s} a second; save it with 8 to 32 bits "
             f"and {LEAST_SAMPLES_PER_S} or more a second"
         )
-    content = content[: len(content) // (width * count) * width * count]
+    return pcm_samples(
+        content[: len(content) // (width * count) * width * count], width, count
+    ), samples_per_s
+
+
+def pcm_samples(content: bytes, width: int, channels: int) -> np.ndarray:
+    """(N, channels) integers, of whole samples of ``width`` bytes as WAV has them."""
     if width == 3:  # the two upper bytes
         samples = np.frombuffer(content, np.uint8).reshape(-1, 3)[:, 1:].copy().view("<i2")[:, 0]
     elif width == 1:
         samples = (np.frombuffer(content, np.uint8).astype(np.int16) - 128) * 256
     else:
         samples = np.frombuffer(content, {2: "<i2", 4: "<i4"}[width])
-    return samples.reshape(-1, count), samples_per_s
+    return samples.reshape(-1, channels)
 
 
-def _reading(frames: LtcFrames, rate: str | None, name: str, channel: int) -> LtcReading:
+def reading_of(frames: LtcFrames, rate: str | None, name: str, channel: int) -> LtcReading:
+    """What frames come to. Raises BadInput where ``rate`` cannot be, or is None and cannot be measured."""
     drop = bool(np.median(frames.drop))
     counting = Counting(rate or ("29.97" if drop else _measured_rate(frames)), drop)
     per_s = float(counting.frames_per_s)

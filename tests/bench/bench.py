@@ -38,6 +38,7 @@ def main() -> int:
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
     parser.add_argument("--minutes", help="of studio: how long the growth of a page is watched")
+    parser.add_argument("--bridge", action="append", help="of bridges: only this one; repeatable")
     parser.add_argument("--folder", type=Path, help="for figures and picture; default .bench")
     options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
@@ -59,6 +60,8 @@ def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
         command += [f"--{name}={value}" for name in ("gloves", "seconds") if (value := vars(options)[name])]
     if part == "studio" and options.minutes:
         command += [f"--minutes={options.minutes}"]
+    if part == "bridges":
+        command += [f"--bridge={name}" for name in options.bridge or ()]
     return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode
 
 

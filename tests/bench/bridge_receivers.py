@@ -94,6 +94,10 @@ def unreal(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
     return _datagrams(host, port, {f"glovecal_{glove}".encode(): glove for glove in gloves})
 
 
+def rokoko(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
+    return _datagrams(host, port, {f'"glove":"{glove}"'.encode(): glove for glove in gloves})
+
+
 def _datagrams(host: str, port: int, glove_of: dict[bytes, str]) -> Iterator[Arrival]:
     """By what stands in the datagrams of each glove."""
     import socket
@@ -109,7 +113,7 @@ def _datagrams(host: str, port: int, glove_of: dict[bytes, str]) -> Iterator[Arr
 
 
 KINDS: dict[str, Callable[[str, int, tuple[str, ...]], Iterator[Arrival]]] = {
-    each.__name__: each for each in (websocket, foxglove, lsl, ros2, vmc, unreal)
+    each.__name__: each for each in (websocket, foxglove, lsl, ros2, vmc, unreal, rokoko)
 }
 
 

@@ -1,6 +1,6 @@
 """Live bridges, measured: two gloves at 120 Hz through each of them to a receiver that nobody shares.
 
-    python tests/bench/bridges_bench.py [--quick] [--smoke] [--json FILE]
+    python tests/bench/bridges_bench.py [--quick] [--smoke] [--bridge NAME ...] [--json FILE]
 
 Real zenoh; gloves, bridge (``glovecal bridge``) and receivers are processes. The added delay is the bridge's
 own figure, from a pose's arrival in its process to its departure; the delay from the hand is measured by the
@@ -35,9 +35,11 @@ from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 RATE_HZ = 120.0
 RECEIVERS = Path(__file__).with_name("bridge_receivers.py")
-BRIDGES = ("websocket", "lsl", "ros2", "foxglove", "vmc", "unreal")
+BRIDGES = ("websocket", "lsl", "ros2", "foxglove", "vmc", "unreal", "rokoko")
 ADDED_P99_MS, LIVE_AGAIN_S = 3.0, 2.0
 """What issue 34 asks for."""
+_SENDS = {"ros2", "vmc", "unreal", "rokoko"}
+"""Bridges that are told where to send to; the others listen."""
 _BOTH_READ = {"websocket", "lsl", "ros2", "foxglove"}
 """Bridges with which two receivers can be connected at once."""
 
@@ -46,12 +48,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="shorter runs, fewer kills")
     parser.add_argument("--smoke", action="store_true", help="only whether it runs, with one bridge")
+    parser.add_argument("--bridge", action="append", choices=BRIDGES, help="only this one; repeatable")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
     pin_blas_to_one_thread()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process of ours stays behind
     seconds, kills = (2.0, 1) if options.smoke else (10.0, 5) if options.quick else (30.0, 20)
-    figures = [measure(name, seconds, kills) for name in (BRIDGES[:1] if options.smoke else BRIDGES)]
+    names = options.bridge or (BRIDGES[:1] if options.smoke else BRIDGES)
+    figures = [measure(name, seconds, kills) for name in names]
     show(figures, kills)
     if options.json:
         options.json.write_text(json.dumps({"bridges": figures, "load": os.getloadavg()[0]}, indent=1))
@@ -68,7 +72,7 @@ def measure(bridge: str, seconds: float, kills: int) -> dict[str, Any]:
         if bridge == "ros2":
             address = endpoint.removeprefix("tcp/")
         host, port = address.split(":")
-        place = ("--to", address) if bridge in ("ros2", "vmc", "unreal") else ("--port", port)
+        place = ("--to", address) if bridge in _SENDS else ("--port", port)
         place = () if bridge == "lsl" else place
         opened = running.enter_context(_Bridge.started(endpoint, bridge, place, gloves))
         names = tuple(glove.replace("-", "_") for glove in gloves) if bridge == "ros2" else gloves

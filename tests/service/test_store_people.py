@@ -185,6 +185,8 @@ def test_a_recording_moves_forward_only(store):
     asked_s = recording_facts.pop("stop_asked_s")
     assert done.ended_at == datetime.fromtimestamp(asked_s, UTC)
     assert recording_facts == {"pre_roll": {"asked_s": 60.0}, "first_sequence": 7, **facts}
+    with pytest.raises(Conflict, match="is over; say it of its take"):
+        store.recordings.note_time_code(recording.id, {"time_code": "10:00:00:00"})
     assert store.recordings.stop(recording.id).state == "done"
     assert store.recordings.update(recording.id, state="failed").state == "done"
     second = store.recordings.request("left", name="run")

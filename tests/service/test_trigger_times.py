@@ -46,6 +46,21 @@ CODES = [
 ]
 
 
+def test_the_code_of_a_line_goes_before_that_of_triggers() -> None:
+    running = {"time_code": "10:00:00:05", "rate": "25", "source": "LTC of a line", "computer": "there"}
+    running |= {"monotonic_s": 7.0, "wall_s": 1_000_499.5}
+    facts = trigger_facts({"time_code": running}, CLOCK)
+    assert facts == {
+        "time_code": {
+            "label": "10:00:00:05", "rate": "25", "drop": False, "time_s": 499.5, "source": "LTC of a line"
+        }
+    }  # fmt: skip
+    start = trigger(time_code="01:00:00:00", rate="25")
+    both = trigger_facts({"time_code": {**running, "computer": "here"}, "trigger": {"start": start}}, CLOCK)
+    assert (both["time_code"]["label"], both["time_code"]["time_s"]) == ("10:00:00:05", 7.0)
+    assert both["trigger"]["start"]["time_code"] == "01:00:00:00"
+
+
 @pytest.mark.parametrize(("start", "stop", "expected"), CODES)
 def test_the_takes_time_code_is_the_first_that_can_be_counted(
     start: dict[str, Any], stop: dict[str, Any], expected: tuple[Any, ...] | None

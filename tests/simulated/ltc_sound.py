@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import wave
+from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -50,25 +52,37 @@ def ltc_sound(
     end_s = begin_s + len(bits) * bit_s
     times.append(end_s)
     levels.append(0.0)
-    count = round((end_s + 0.05) * samples_per_s) * oversampling
+    samples = round((end_s + 0.05) * samples_per_s) * oversampling
     fine = (
-        (np.arange(count) - oversampling / 2 + 0.5) / samples_per_s / oversampling
+        (np.arange(samples) - oversampling / 2 + 0.5) / samples_per_s / oversampling
     )  # a sample's middle is its time
     square = np.array(levels)[np.searchsorted(times, fine, side="right") - 1]
     return square.reshape(-1, oversampling).mean(axis=1)
 
 
-def write_wav(path: Path, channels: np.ndarray, samples_per_s: int = 48_000, width: int = 2) -> Path:
-    """(N, channels), full scale 1, as PCM of ``width`` bytes."""
+def endless_ltc(first: int, samples_per_s: int) -> Iterator[np.ndarray]:
+    """Seconds of sound of 25 frames a second, frame ``first`` of the day at its beginning. Each frame has an
+    even number of edges, so that seconds fit together."""
+    for second in count(first // 25):
+        hour, minute = second // 3600 % 24, second // 60 % 60
+        labels = [(hour, minute, second % 60, frame) for frame in range(25)]
+        yield ltc_sound(labels, 25.0, samples_per_s, begin_s=0.0)[:samples_per_s]
+
+
+def pcm(channels: np.ndarray, width: int = 2) -> bytes:
+    """(N, channels), full scale 1, as samples of ``width`` bytes."""
     top = 2 ** (8 * width - 1) - 1
     whole = np.round(np.clip(channels, -1, 1) * top).astype("<i8")
     if width == 1:
-        content = (whole + 128).astype(np.uint8).tobytes()
-    else:
-        content = whole.reshape(-1).view(np.uint8).reshape(-1, 8)[:, :width].tobytes()
+        return (whole + 128).astype(np.uint8).tobytes()
+    return whole.reshape(-1).view(np.uint8).reshape(-1, 8)[:, :width].tobytes()
+
+
+def write_wav(path: Path, channels: np.ndarray, samples_per_s: int = 48_000, width: int = 2) -> Path:
+    """(N, channels), full scale 1, as PCM of ``width`` bytes."""
     with wave.open(str(path), "wb") as sound:
         sound.setnchannels(channels.shape[1])
         sound.setsampwidth(width)
         sound.setframerate(samples_per_s)
-        sound.writeframes(content)
+        sound.writeframes(pcm(channels, width))
     return path

@@ -7,6 +7,7 @@ from glovecal_models.names import did_you_mean
 from glovecal_service.bridges.bridge import Bridge
 from glovecal_service.bridges.foxglove import FoxgloveBridge
 from glovecal_service.bridges.lsl import LslBridge
+from glovecal_service.bridges.rokoko import RokokoBridge
 from glovecal_service.bridges.ros2 import Ros2Bridge
 from glovecal_service.bridges.unreal import UnrealBridge
 from glovecal_service.bridges.vmc import VmcBridge
@@ -19,6 +20,7 @@ BRIDGES: dict[str, type[Bridge]] = {
     "foxglove": FoxgloveBridge,
     "vmc": VmcBridge,
     "unreal": UnrealBridge,
+    "rokoko": RokokoBridge,
 }
 
 

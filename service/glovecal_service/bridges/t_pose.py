@@ -23,6 +23,7 @@ UNITY_AXES: dict[Handedness, tuple[Vector, Vector, Vector]] = {
     "left": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
 }
 """M of each hand, by rows: from the hand's frame to Unity's."""
+UNITY_FINGERS = {"thumb": "Thumb", "index": "Index", "middle": "Middle", "ring": "Ring", "pinky": "Little"}
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,11 @@ class FingerBone:
     part: str
     turn: Quaternion
     place_mm: Vector
+
+    @property
+    def number(self) -> int:
+        """0 to 2 from the palm on, of the thumb as well."""
+        return PHALANGES[self.finger].index(self.part)
 
 
 def finger_bones(bones: HandBones, turned: Sequence[Quaternion]) -> Iterator[FingerBone]:
@@ -51,9 +57,15 @@ def finger_bones(bones: HandBones, turned: Sequence[Quaternion]) -> Iterator[Fin
                 parent = bones.parents[parent]
             if parent is not None and bones.names[parent] != HAND:
                 turn, place_mm = product(rest, turn), moved(rest, place_mm)
-            w, *along = product(turn, inverse(rest))
-            x, y, z = _by(axes, along)
-            yield FingerBone(finger, part, (w, -x, -y, -z), _by(axes, place_mm))
+            turn = in_unity(product(turn, inverse(rest)), bones.skeleton.hand)
+            yield FingerBone(finger, part, turn, _by(axes, place_mm))
+
+
+def in_unity(turn: Quaternion, hand: Handedness) -> Quaternion:
+    """A rotation by the hand's axes, by Unity's."""
+    w, *along = turn
+    x, y, z = _by(UNITY_AXES[hand], along)
+    return w, -x, -y, -z
 
 
 def _is_of_palm(name: str) -> bool:

@@ -14,75 +14,42 @@ While poses are stale or uncalibrated nothing is sent; a bone whose angle is not
 from __future__ import annotations
 
 import json
-from types import TracebackType
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from glovecal_models.hand.bones import HAND, PHALANGES
+from glovecal_models.hand.bones import HAND
 from glovecal_models.hand.skeleton import Quaternion, Vector
+from glovecal_service.bridges.avatar_bridge import AvatarBridge
 from glovecal_service.bridges.bone_turns import NO_TURN
-from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
-from glovecal_service.bridges.datagrams import DatagramSender
-from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
-from glovecal_service.bridges.t_pose import finger_bones
-from glovecal_service.bridges.traffic import Traffic
+from glovecal_service.bridges.bridge import LOOPBACK
+from glovecal_service.bridges.glove_pose import GlovePose
+from glovecal_service.bridges.t_pose import FingerBone
 
-DEFAULT_ADDRESS = f"{LOOPBACK}:54321"
 _SIDE = {"right": "r", "left": "l"}
 
 
-class UnrealBridge(Bridge):
+class UnrealBridge(AvatarBridge):
     """Sends one or two hands to a Live Link source in Unreal's editor or game."""
 
     about = "Unreal Engine by JSONLiveLink or a Live Link source like it"
     to_set_there = "its source at the port sent to; subjects `glovecal_GLOVE`; a retargeter for the mannequin"
     units = "cm and rotations from the T-pose; Unreal's axes: left-handed, z up, the character faces y"
     when_stale = "nothing is sent"
+    form = "Live Link as JSON"
+    default_address = f"{LOOPBACK}:54321"
     options: ClassVar[dict[str, str]] = {
-        "to": f"HOST:PORT where the Live Link source listens; default {DEFAULT_ADDRESS}",
+        "to": f"HOST:PORT where the Live Link source listens; default {default_address}",
     }
 
-    def __init__(self, options: BridgeOptions, traffic: Traffic) -> None:
-        super().__init__(options, traffic)
-        self._host, self._port = options.address(DEFAULT_ADDRESS)
-        self._sender: DatagramSender | None = None
-        self._motions: dict[str, BonesInMotion] = {}
-
-    @property
-    def where(self) -> str:
-        return f"Live Link as JSON to {self._host}:{self._port}."
-
-    def send(self, hand: GlovePose) -> None:
-        if hand.state != "live" or self._sender is None:
-            return
-        document = self._subject(hand)
-        if document is not None and self._sender.send(json.dumps(document).encode("ascii")):
-            self._traffic.note_departure(hand)
-        else:
-            self._traffic.note_left_out(hand.glove)
-
-    def _subject(self, hand: GlovePose) -> dict[str, Any] | None:
-        """None where it is not known which hand the glove is on."""
-        posture = self._motions.setdefault(hand.glove, BonesInMotion()).turned(hand)
-        if posture is None or hand.meaning.hand is None:
-            return None
-        side = _SIDE[hand.meaning.hand]
+    def datagram(self, hand: GlovePose, bones: Sequence[FingerBone] | None) -> bytes:
+        if bones is None:
+            return b""
+        side = _SIDE[str(hand.meaning.hand)]
         rows = [_row(f"{HAND}_{side}", -1, (0.0, 0.0, 0.0), NO_TURN)]
-        for bone in finger_bones(*posture):
-            number = PHALANGES[bone.finger].index(bone.part)
-            parent = 0 if number == 0 else len(rows) - 1
-            rows.append(_row(f"{bone.finger}_0{number + 1}_{side}", parent, bone.place_mm, bone.turn))
-        return {f"glovecal_{hand.glove}": rows}
-
-    def __enter__(self) -> UnrealBridge:
-        self._sender = DatagramSender(self._host, self._port)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._sender is not None:
-            self._sender.close()
-            self._sender = None
+        for bone in bones:
+            parent = 0 if bone.number == 0 else len(rows) - 1
+            rows.append(_row(f"{bone.finger}_0{bone.number + 1}_{side}", parent, bone.place_mm, bone.turn))
+        return json.dumps({f"glovecal_{hand.glove}": rows}).encode("ascii")
 
 
 def _row(name: str, parent: int, place_mm: Vector, turn: Quaternion) -> dict[str, Any]:

@@ -10,79 +10,52 @@ are stale or uncalibrated it comes alone, without bones; a bone whose angle is n
 from __future__ import annotations
 
 import struct
-from types import TracebackType
+from collections.abc import Sequence
 from typing import ClassVar
 
-from glovecal_models.hand.bones import DISTAL, INTERMEDIATE, METACARPAL, PROXIMAL
-from glovecal_service.bridges.bridge import LOOPBACK, Bridge, BridgeOptions
-from glovecal_service.bridges.datagrams import DatagramSender
-from glovecal_service.bridges.glove_pose import BonesInMotion, GlovePose
-from glovecal_service.bridges.t_pose import FingerBone, finger_bones
+from glovecal_service.bridges.avatar_bridge import AvatarBridge
+from glovecal_service.bridges.bridge import LOOPBACK, BridgeOptions
+from glovecal_service.bridges.glove_pose import GlovePose
+from glovecal_service.bridges.t_pose import UNITY_FINGERS, FingerBone
 from glovecal_service.bridges.traffic import Traffic
 
-DEFAULT_ADDRESS = f"{LOOPBACK}:39540"
-_UNITY_FINGERS = {"thumb": "Thumb", "index": "Index", "middle": "Middle", "ring": "Ring", "pinky": "Little"}
-_UNITY_PARTS = {PROXIMAL: "Proximal", INTERMEDIATE: "Intermediate", DISTAL: "Distal"}
-_THUMB_PARTS = {METACARPAL: "Proximal", PROXIMAL: "Intermediate", DISTAL: "Distal"}
+_UNITY_PARTS = ("Proximal", "Intermediate", "Distal")
 _LOADED, _CALIBRATED, _NORMAL_MODE = 1, 3, 0
 
 
-class VmcBridge(Bridge):
+class VmcBridge(AvatarBridge):
     """Sends the fingers of one or two hands to a program that shows an avatar."""
 
     about = "avatars: Unity, Warudo, VSeeFace, VMagicMirror, Unreal with VMC plug-ins"
     to_set_there = "its VMC receiver on, at the port sent to; in EVMC4U *Bone Position Synchronize* off"
     units = "rotations from the T-pose; Unity's axes: left-handed, y up, the avatar faces z"
     when_stale = "bones stop, /VMC/Ext/OK says tracking 0"
+    form = "VMC by OSC"
+    default_address = f"{LOOPBACK}:39540"
     options: ClassVar[dict[str, str]] = {
-        "to": f"HOST:PORT where the avatar's program listens for VMC; default {DEFAULT_ADDRESS}",
+        "to": f"HOST:PORT where the avatar's program listens for VMC; default {default_address}",
     }
 
     def __init__(self, options: BridgeOptions, traffic: Traffic) -> None:
         super().__init__(options, traffic)
-        self._host, self._port = options.address(DEFAULT_ADDRESS)
-        self._sender: DatagramSender | None = None
-        self._motions: dict[str, BonesInMotion] = {}
         self._is_sound: dict[str, bool] = {}
 
-    @property
-    def where(self) -> str:
-        return f"VMC by OSC to {self._host}:{self._port}."
-
-    def send(self, hand: GlovePose) -> None:
-        if self._sender is None:
-            return
-        motion = self._motions.setdefault(hand.glove, BonesInMotion())
-        moved = motion.turned(hand) if hand.state == "live" else None
-        self._is_sound[hand.glove] = moved is not None and bool(hand.pose.usable.all())
+    def datagram(self, hand: GlovePose, bones: Sequence[FingerBone] | None) -> bytes:
+        self._is_sound[hand.glove] = bones is not None and bool(hand.pose.usable.all())
         tracking = int(all(self._is_sound.values()))
         messages = [_message("/VMC/Ext/OK", "iiii", _LOADED, _CALIBRATED, _NORMAL_MODE, tracking)]
-        if moved is not None:
+        if bones is not None:
             messages.append(_message("/VMC/Ext/T", "f", hand.pose.monotonic_ns / 1e9))
             messages += [
                 _message("/VMC/Ext/Bone/Pos", "sfffffff", _unity_name(hand, bone), *_turned(bone))
-                for bone in finger_bones(*moved)
+                for bone in bones
             ]
-        if not self._sender.send(_bundle(messages)) or (moved is None and hand.state == "live"):
-            self._traffic.note_left_out(hand.glove)
-        else:
-            self._traffic.note_departure(hand)
-
-    def __enter__(self) -> VmcBridge:
-        self._sender = DatagramSender(self._host, self._port)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._sender is not None:
-            self._sender.close()
-            self._sender = None
+        return _bundle(messages)
 
 
 def _unity_name(hand: GlovePose, bone: FingerBone) -> str:
-    parts = _THUMB_PARTS if bone.finger == "thumb" else _UNITY_PARTS
-    return f"{str(hand.meaning.hand).capitalize()}{_UNITY_FINGERS[bone.finger]}{parts[bone.part]}"
+    hand_name = str(hand.meaning.hand).capitalize()
+    return f"{hand_name}{UNITY_FINGERS[bone.finger]}{_UNITY_PARTS[bone.number]}"
 
 
 def _turned(bone: FingerBone) -> tuple[float, ...]:

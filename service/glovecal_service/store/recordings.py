@@ -13,7 +13,12 @@ from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
 from glovecal_service.store.database import Database, grow_revision, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
-from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecord, RecordingState
+from glovecal_service.store.records import (
+    OPEN_RECORDING_STATES,
+    TIME_CODE,
+    RecordingRecord,
+    RecordingState,
+)
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
@@ -120,6 +125,19 @@ class Recordings:
             if trigger is not None:
                 asked[TRIGGER] = {**before.facts.get(TRIGGER, {}), "stop": dict(trigger)}
             return _move(connection, id, "stopping", asked, name)
+
+    def note_time_code(self, id: str, code: Mapping[str, Any]) -> RecordingRecord:
+        """A SMPTE time code that was heard while it goes on, and when; its take will have it.
+
+        Raises NotFound, and Conflict where its take is there already.
+        """
+        with self._database.write() as connection:
+            record = _require(connection, id)
+            if record.state not in OPEN_RECORDING_STATES:
+                raise Conflict(
+                    f"recording {record.name!r} is over; say it of its take: PUT /v1/takes/ID/time-code"
+                )
+            return _move(connection, id, None, {TIME_CODE: dict(code)})
 
     def update(self, id: str, *, state: RecordingState | None = None, **facts: Any) -> RecordingRecord:
         """Report what became of it: facts are merged, the state only moves forward.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from bridge_support import FIST, FLAT, Stage, WornHand, running_bridge
-from datagram_reader import datagrams
+from datagram_reader import datagrams, first
 from realtime_support import eventually
 from scipy.spatial.transform import Rotation
 
@@ -27,11 +27,11 @@ TO_UNREAL: dict[Handedness, Callable[[np.ndarray], np.ndarray]] = {
 def subject_of(
     receive: Callable[[], bytes], name: str, is_wanted: Callable[[list[dict[str, Any]]], bool] = bool
 ) -> list[dict[str, Any]]:
-    def wanted() -> list[dict[str, Any]] | None:
-        rows = json.loads(receive().decode("ascii")).get(name)
+    def wanted(datagram: bytes) -> list[dict[str, Any]] | None:
+        rows = json.loads(datagram.decode("ascii")).get(name)
         return rows if rows and is_wanted(rows) else None
 
-    return eventually(wanted, f"subject {name}")
+    return first(receive, wanted, f"subject {name}")
 
 
 def placed(rows: list[dict[str, Any]]) -> dict[str, tuple[np.ndarray, Rotation]]:

@@ -6,21 +6,21 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from bridge_support import FIST, FLAT, Stage, WornHand, refused, running_bridge
-from datagram_reader import datagrams
+from bridge_support import FIST, Stage, WornHand, refused, running_bridge
+from datagram_reader import datagrams, first
 from pythonosc.osc_bundle import OscBundle
 from realtime_support import eventually
 from scipy.spatial.transform import Rotation
+from unity_hands import in_unity
 
 from glovecal_client.wire.pose import RotationFlag
-from glovecal_models.hand.bones import PHALANGES, HandBones
-from glovecal_models.hand.rotations import HAND_ROTATIONS, Handedness
+from glovecal_models.hand.bones import PHALANGES
+from glovecal_models.hand.rotations import Handedness
 
 CHAINS = {
     finger: tuple(f"{name}{part}" for part in ("Proximal", "Intermediate", "Distal"))
     for finger, name in zip(PHALANGES, ("Thumb", "Index", "Middle", "Ring", "Little"), strict=True)
 }
-TO_UNITY = {"right": lambda p: np.array([p[0], p[2], p[1]]), "left": lambda p: np.array([-p[0], p[2], -p[1]])}
 
 
 def read(datagram: bytes) -> dict[str, Any]:
@@ -39,12 +39,12 @@ def read(datagram: bytes) -> dict[str, Any]:
 def hand_of(
     receive: Callable[[], bytes], hand: Handedness, is_wanted: Callable[[dict[str, Any]], bool]
 ) -> Any:
-    def wanted() -> dict[str, Any] | None:
-        found = read(receive())
+    def wanted(datagram: bytes) -> dict[str, Any] | None:
+        found = read(datagram)
         is_this = any(name.startswith(hand.capitalize()) for name in found["bones"])
         return found if is_this and is_wanted(found) else None
 
-    return eventually(wanted, f"the {hand} hand")
+    return first(receive, wanted, f"the {hand} hand")
 
 
 SIGNS: list[tuple[Handedness, str, str, list[int]]] = [
@@ -94,13 +94,11 @@ def pointing(bones: dict[str, Rotation], hand: Handedness, finger: str) -> list[
 
 
 def require_directions(found: dict[str, Any], worn: WornHand, angles: dict[str, float]) -> None:
-    bones = HandBones.of(worn.skeleton)
-    turned = bones.orientations(np.array([[{**FLAT, **angles}[name] for name in HAND_ROTATIONS]]))[0]
-    in_hand = turned[0].T @ turned
-    for finger, parts in PHALANGES.items():
-        for part, direction in zip(parts, pointing(found["bones"], worn.hand, finger), strict=True):
-            ours = TO_UNITY[worn.hand](in_hand[bones.names.index(f"{finger}_{part}")][:, 0])
-            assert np.degrees(np.linalg.norm(direction - ours)) < 1e-4, (finger, part)
+    expected = in_unity(worn, angles)
+    for finger in PHALANGES:
+        for number, direction in enumerate(pointing(found["bones"], worn.hand, finger)):
+            ours, _ = expected[finger, number]
+            assert np.degrees(np.linalg.norm(direction - ours)) < 1e-4, (finger, number)
 
 
 def test_an_avatars_fingers_point_where_the_hands_do(stage: Stage) -> None:
@@ -122,7 +120,7 @@ def test_uncertain_fingers_keep_still_and_stale_hands_send_no_bones(stage: Stage
         found = hand_of(receive, "right", lambda each: each["/VMC/Ext/OK"][-1] == 0)
         require_directions(found, stage.right, {**FIST, "M_PIP": 5.0})
         stage.show(right=None)
-        silent = eventually(lambda: each if not (each := read(receive()))["bones"] else None, "no bones")
+        silent = first(receive, lambda got: None if (each := read(got))["bones"] else each, "no bones")
         assert silent["/VMC/Ext/OK"] == [1, 3, 0, 0]
         summary = bridge.end()
     assert summary["gloves"]["right"]["left_out"] == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import http.server
 import json
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -109,7 +110,10 @@ def test_a_receiver_that_does_not_read_gets_the_newest_and_holds_up_nobody(stage
     with running_bridge(stage, "websocket", "--port", 0, "--glove", "right") as bridge:
         host, port = bridge.place()
         address = f"ws://{host}:{port}/"
-        with connect(address, max_queue=1) as sleeping, connect(address, max_queue=1) as reading:
+        narrow = socket.socket()
+        narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # a few poses wait in the system
+        narrow.connect((host, port))
+        with connect(address, max_queue=1, sock=narrow) as sleeping, connect(address) as reading:
             stage.show(right={"angles": FIST})
 
             def is_left_out() -> bool:

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import re
 import socket
+import struct
+import subprocess
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 from cli_running import Run, Started, glovecal, start
+from ltc_sound import endless_ltc, pcm
 from realtime_support import eventually, free_endpoint
 from trigger_packets import RECORD_START, RECORD_STOP, START, STOP, natnet
 
+from glovecal_client.clock import clock_s
 from glovecal_client.rest import RestClient
+from glovecal_models.takes.time_code import TimeCode
 
 HERE = "127.0.0.1"
 HANDS = ("right", "left")
@@ -54,7 +61,8 @@ def end(process: Started) -> tuple[str, str]:
 class Stage:
     """The other system: sends packets, and takes those that come back."""
 
-    def __init__(self, port: int, live: dict[str, str]) -> None:
+    def __init__(self, port: int, live: dict[str, str], process: Started) -> None:
+        self.process = process
         self.run: Run = partial(glovecal, live)
         self._port, self._url = port, live["GLOVECAL_URL"]
         self.complaints = ""
@@ -96,12 +104,12 @@ def triggered(live: dict[str, str], *options: str, protocol: str = "vicon") -> I
     """``glovecal trigger right left``, until the block ends; it must end cleanly."""
     port = int(free_endpoint().rpartition(":")[2])
     listening = ("--listen", f"{protocol}:{port}", "--pre-roll", "1")
-    process = start(live, "trigger", *HANDS, *listening, *options)
+    process = start(live, "trigger", *HANDS, *listening, *options, stdin=subprocess.PIPE)
     try:
         assert process.stdout is not None
         while not (line := process.stdout.readline()).startswith("Gloves: right, left."):
             assert line, process.communicate()
-        stage = Stage(port, live)
+        stage = Stage(port, live, process)
         with stage.socket:
             yield stage
     finally:
@@ -111,13 +119,24 @@ def triggered(live: dict[str, str], *options: str, protocol: str = "vicon") -> I
     assert re.search(r"^\d+ triggers", out, re.MULTILINE), out
 
 
+@contextmanager
+def receiver() -> Iterator[tuple[socket.socket, str]]:
+    """Another system that is told of recordings, and where."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((HERE, 0))
+        other.settimeout(120)
+        yield other, f"{HERE}:{other.getsockname()[1]}"
+
+
 def test_both_hands_are_recorded_as_vicon_asks(live: dict[str, str]) -> None:
-    with triggered(live, "--rate", "25") as stage:
+    with receiver() as (other, send), triggered(live, "--rate", "25", "--send", f"vicon:{send}") as stage:
         before_s = time.time()
         stage.send(START, START, START)
         eventually(lambda: stage.goes_on(2), "both hands are recorded")
         stage.send(STOP.replace(b"Walk 01", b"Walk/01 good"), STOP)
         takes = stage.recorded("Walk_01 good")
+        passed_on = other.recv(4096)
+    assert re.search(rb'<TimeCode VALUE="10:2\d:\d\d:\d\d" />', passed_on), "the trigger's, counted on"
     assert {take["known_hand"] for take in takes} == set(HANDS)
     assert len(stage.recordings()) == 2
     for take in takes:
@@ -152,6 +171,55 @@ def test_a_name_that_is_taken_gets_a_number(live: dict[str, str]) -> None:
             assert takes[0]["facts"]["trigger"]["start"]["time_code"] == "10:20:30:12"
 
 
+class Line(threading.Thread):
+    """What ``arecord`` would write: 25 frames a second from 10:00:00:00 on, until it is cut."""
+
+    def __init__(self, process: Started) -> None:
+        super().__init__(daemon=True)
+        assert process.stdin is not None
+        self._stream: BinaryIO = process.stdin.buffer  # type: ignore[attr-defined]
+        self._cut = threading.Event()
+        self.begin_s = clock_s()
+
+    def run(self) -> None:
+        form = struct.pack("<IHHIIHH", 16, 1, 1, 12_000, 24_000, 2, 16)
+        with suppress(BrokenPipeError):
+            self._stream.write(b"RIFF\xff\xff\xff\xffWAVEfmt " + form + b"data\xff\xff\xff\xff")
+            sent = 0
+            for second in endless_ltc(25 * 36_000, 12_000):
+                for part in second.reshape(10, -1, 1):
+                    sent += len(part)
+                    if self._cut.wait(max(0.0, self.begin_s + sent / 12_000 - clock_s())):
+                        return
+                    self._stream.write(pcm(0.3 * part))
+                    self._stream.flush()
+
+    def cut(self) -> None:
+        self._cut.set()
+        self.join()
+
+
+def test_takes_get_the_time_code_of_a_line_and_others_are_told_it(live: dict[str, str]) -> None:
+    with receiver() as (other, send), triggered(live, "--ltc", "-", "--send", f"vicon:{send}") as stage:
+        line = Line(stage.process)
+        line.start()
+        eventually(lambda: "Time code on the line: 10:00:" in stage.process.so_far, "it is heard")
+        stage.send(START.replace(b"Walk 01", b"Coded").replace(b"28472", b"31"))
+        eventually(lambda: stage.process.so_far.count("): time code 10:00:") == 2, "both have it")
+        sent = other.recv(4096)
+        line.cut()
+        eventually(lambda: "No time code on the line since 10:0" in stage.process.so_far, "its loss")
+        stage.send(STOP.replace(b"Walk 01", b"Coded").replace(b"28473", b"32"))
+        takes = stage.recorded("Coded")
+    assert re.search(rb'<TimeCode VALUE="10:0\d:\d\d:\d\d" />', sent)
+    for take in takes:
+        code = TimeCode(**take["time_code"])
+        assert (code.rate, code.source) == ("25", "LTC of a line")
+        label = code.at(line.begin_s + 1.02)
+        assert label[:8] in ("10:00:01", "10:00:00"), "sound that a busy computer reads late"
+        assert take["facts"]["trigger"]["start"]["time_code"] == "10:20:30:12", "kept as it was sent"
+
+
 def test_natnet_and_its_answers(live: dict[str, str]) -> None:
     with triggered(live, protocol="natnet") as stage:
         stage.send(natnet("StopRecording"))
@@ -182,13 +250,8 @@ def test_osc_a_lost_stop_and_a_process_that_died(live: dict[str, str]) -> None:
 
 
 def test_what_a_person_records_is_told_to_others_and_left_alone(live: dict[str, str]) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind((HERE, 0))
-        other.settimeout(120)
-        port = other.getsockname()[1]
-        targets = [
-            word for name in ("vicon", "natnet", "osc") for word in ("--send", f"{name}:{HERE}:{port}")
-        ]
+    with receiver() as (other, send):
+        targets = [word for name in ("vicon", "natnet", "osc") for word in ("--send", f"{name}:{send}")]
         with triggered(live, *targets) as stage:
             recording = start(live, "record", "right", "By hand", "--seconds", "600", "--pre-roll", "0")
             try:

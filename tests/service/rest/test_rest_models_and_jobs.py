@@ -341,6 +341,13 @@ def test_recordings(client: RestClient, settings: Settings) -> None:
     with pytest.raises(Refused, match="lead_s") as refused:
         client.post("/recordings", {"glove": "left", "name": "again", "lead_s": 601})
     assert refused.value.status == 422
+    running = {"time_code": "10:00:00:05", "rate": "25", "source": "LTC of a line", "computer": "here"}
+    running |= {"wall_s": 1.7e9, "monotonic_s": 12.5}
+    place = f"/recordings/{recording['id']}/time-code"
+    assert client.put(place, running)["facts"]["time_code"] == running
+    with pytest.raises(Refused, match="there is no time code 10:00:00:25 at 25") as refused:
+        client.put(place, {**running, "time_code": "10:00:00:25"})
+    assert refused.value.status == 422
     assert client.post(f"/recordings/{recording['id']}/stop")["state"] == "stopping"
     assert client.get("/recordings", {"only_open": True})[0]["id"] == recording["id"]
     assert client.get(f"/recordings/{recording['id']}")["name"] == "wave"

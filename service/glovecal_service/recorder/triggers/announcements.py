@@ -7,16 +7,15 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import Literal
 
+from glovecal_client.clock import clock_s
 from glovecal_models.errors import BadInput
-from glovecal_service.plain import read
+from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.recorder.triggers.formats import Endpoint
+from glovecal_service.recorder.triggers.open_recordings import OpenRecordings
 from glovecal_service.recorder.triggers.trigger import Trigger
 from glovecal_service.rest.glove.answer import Recording
-
-if TYPE_CHECKING:
-    from glovecal_client.rest import RestClient
 
 MOST_OWN = 64
 """Packets sent lately, known again where they come back by a broadcast."""
@@ -27,17 +26,18 @@ class Announcements:
 
     def __init__(
         self,
-        service: RestClient,
-        gloves: Sequence[str],
+        recordings: OpenRecordings,
         targets: Sequence[Endpoint],
         *,
+        time_code: Callable[[], TimeCode | None] = lambda: None,
         tell: Callable[[str], None],
     ) -> None:
-        """Raises BadInput for a host that is not known. A recording that goes on already only ends."""
-        self._service, self._gloves, self._tell = service, set(gloves), tell
+        """``time_code``: what runs now, by this computer's monotonic clock. Raises BadInput for a host that
+        is not known. A recording that goes on already only ends."""
+        self._recordings, self._time_code, self._tell = recordings, time_code, tell
         self._sockets = [(target, *_reached(target)) for target in targets]
         self._own: deque[tuple[int, bytes]] = deque(maxlen=MOST_OWN)
-        self._going_on: str | None = self._recorded_name() if targets else None
+        self._going_on: str | None = _first_name(recordings.now()) if targets else None
 
     def close(self) -> None:
         for _, opened, _ in self._sockets:
@@ -51,7 +51,7 @@ class Announcements:
         """Send what has to be sent. Raises ServiceError where the service does not answer."""
         if not self._sockets:
             return
-        name = self._recorded_name()
+        name = _first_name(self._recordings.now())
         if name == self._going_on:
             return
         if self._going_on is not None:
@@ -60,14 +60,10 @@ class Announcements:
             self._send("start", name)
         self._going_on = name
 
-    def _recorded_name(self) -> str | None:
-        """Of the recording of our gloves that began first; None while none of them is recorded."""
-        rows = read(list[Recording], self._service.get("/recordings", {"only_open": True}))
-        ours = [row for row in rows if row.glove in self._gloves and row.state in ("requested", "recording")]
-        return min(ours, key=lambda row: row.requested_at).name if ours else None
-
-    def _send(self, action: str, name: str) -> None:
-        trigger = Trigger("start" if action == "start" else "stop", name, str(secrets.randbelow(2**31)))
+    def _send(self, action: Literal["start", "stop"], name: str) -> None:
+        code = self._time_code()
+        label = "" if code is None else code.at(clock_s())
+        trigger = Trigger(action, name, str(secrets.randbelow(2**31)), time_code=label)
         for target, opened, address in self._sockets:
             try:
                 for number, packet in enumerate(target.form.packets(trigger)):
@@ -79,6 +75,11 @@ class Announcements:
                 self._tell(f"{target}: {action} of {name} could not be sent: {error.strerror}.")
             else:
                 self._tell(f"{target}: sent {action} of {name}.")
+
+
+def _first_name(rows: Sequence[Recording]) -> str | None:
+    """Of the recording that began first; None while there is none."""
+    return min(rows, key=lambda row: row.requested_at).name if rows else None
 
 
 def _reached(target: Endpoint) -> tuple[socket.socket, tuple]:

@@ -6,11 +6,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from glovecal_client.clock import computer_id
+from glovecal_client.clock import clock_s, computer_id
 from glovecal_client.errors import ServiceError
-from glovecal_client.rest import NoService
+from glovecal_models.errors import BadInput
+from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.plain import read
 from glovecal_service.recorder.triggers.listener import Arrival
+from glovecal_service.recorder.triggers.open_recordings import OpenRecordings, is_away
 from glovecal_service.recorder.triggers.trigger import safe_name
 from glovecal_service.rest.glove.answer import Recording
 from glovecal_service.rest.take.answer import Take
@@ -22,7 +24,9 @@ SETTLED_WITHIN_S = 10.0
 """An earlier recording of the glove makes its account first."""
 BEGINS_WITHIN_S = 10.0
 LOOK_EVERY_S = 0.02
-CONFLICT, UNAVAILABLE = 409, 503
+COUNTED_ON_S = 600.0
+"""A trigger's time code is counted on so long: 60 ms off then, where quartzes differ by 100 ppm."""
+CONFLICT = 409
 TRIGGER, START = "trigger", "start"
 """Facts of a recording that a trigger began."""
 
@@ -43,9 +47,27 @@ class TriggeredRecordings:
         """``rate``: of the time codes in triggers, a name of ``glovecal_models.takes.time_code.RATES``."""
         self._service, self._gloves, self._tell = service, list(gloves), tell
         self._rate, self._pre_roll_s = rate, pre_roll_s
+        self._open = OpenRecordings(service, gloves)
+        self._time_code: TimeCode | None = None
+
+    @property
+    def time_code(self) -> TimeCode | None:
+        """Of the last trigger that had one, while its quartz and ours agree: by this computer's monotonic
+        clock."""
+        code = self._time_code
+        return None if code is None or clock_s() - code.time_s > COUNTED_ON_S else code
+
+    def _sent_time_code(self, arrival: Arrival) -> TimeCode | None:
+        trigger = arrival.trigger
+        begins_s = arrival.monotonic_s + trigger.delay_s
+        try:
+            return TimeCode.of_text(trigger.time_code, self._rate, begins_s, _from(arrival))
+        except BadInput:
+            return None
 
     def carry_out(self, arrival: Arrival) -> bool:
         """Whether it was; what came of it is told. Raises ServiceError where the service does not answer."""
+        self._time_code = self._sent_time_code(arrival) or self._time_code
         if arrival.trigger.action == "start":
             return self._start(arrival)
         return self._stop(arrival)
@@ -97,12 +119,7 @@ class TriggeredRecordings:
 
     def _going_on(self) -> list[Recording]:
         """Those of our gloves that a trigger began and nobody ended."""
-        rows = read(list[Recording], self._service.get("/recordings", {"only_open": True}))
-        return [
-            row
-            for row in rows
-            if row.glove in self._gloves and row.state in ("requested", "recording") and TRIGGER in row.facts
-        ]
+        return [row for row in self._open.now() if TRIGGER in row.facts]
 
     def _request(self, glove: str, document: dict[str, Any]) -> Recording | None:
         """None where the glove cannot be recorded, which is told."""
@@ -164,11 +181,6 @@ class TriggeredRecordings:
             "wall_s": arrival.wall_s,
             "computer": computer_id(),
         }
-
-
-def is_away(error: ServiceError) -> bool:
-    """Whether the service may answer later: nobody is there, or its database is busy."""
-    return isinstance(error, NoService) or error.status == UNAVAILABLE
 
 
 def _sent_name(one: Recording) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field, FiniteFloat, StringConstraints
 
-from glovecal_models.takes.time_code import FrameRate
+from glovecal_models.takes.time_code import FrameRate, TimeCode
 from glovecal_service.request_types import (
     IDENTIFIER,
     ONE_LINE,
@@ -30,8 +30,18 @@ Sent = Annotated[str, StringConstraints(max_length=500, pattern=ONE_LINE)]
 """A field of a trigger, as it was sent."""
 
 
-class ReceivedTrigger(StrictBody):
-    """What another system said when it began or ended a recording, and when that came."""
+class Received(StrictBody):
+    """What came from another system, and when."""
+
+    wall_s: FiniteFloat = Field(description="When it came, Unix seconds of the computer it came to.")
+    monotonic_s: FiniteFloat = Field(description="The same by that computer's monotonic clock.")
+    computer: Annotated[str, StringConstraints(max_length=64, pattern=ONE_LINE)] = Field(
+        description="Whose monotonic clock that is."
+    )
+
+
+class ReceivedTrigger(Received):
+    """What another system said when it began or ended a recording."""
 
     protocol: Identifier
     sender: Sent = ""
@@ -46,11 +56,14 @@ class ReceivedTrigger(StrictBody):
     delay_s: Annotated[FiniteFloat, Field(ge=0, le=60)] = Field(
         0.0, description="From its arrival to what it speaks of."
     )
-    wall_s: FiniteFloat = Field(description="When it came, Unix seconds of the computer it came to.")
-    monotonic_s: FiniteFloat = Field(description="The same by that computer's monotonic clock.")
-    computer: Annotated[str, StringConstraints(max_length=64, pattern=ONE_LINE)] = Field(
-        description="Whose monotonic clock that is."
-    )
+
+
+class RunningTimeCode(Received):
+    """A frame of SMPTE time code that began at that time."""
+
+    time_code: Sent = Field(description="HH:MM:SS:FF of the frame; `;` before the frames is drop-frame.")
+    rate: FrameRate = Field(description="Frames a second.")
+    source: Sent = Field(description="Where it comes from.")
 
 
 class NewRecording(StrictBody):
@@ -101,6 +114,18 @@ def list_recordings(
 @router.get("/{id}", response_model=Recording, summary="One recording", responses=problems())
 def get_recording(id: IdInPath, store: StoreNeeded) -> RecordingRecord:
     return store.recordings.get(id)
+
+
+@router.put(
+    "/{id}/time-code",
+    response_model=Recording,
+    summary="Say which SMPTE time code runs while a glove is recorded",
+    responses=change_problems(409),
+)
+def put_time_code(id: IdInPath, body: RunningTimeCode, store: StoreNeeded) -> RecordingRecord:
+    """Its take will have it, by its own clock. 409 once the recording is over."""
+    TimeCode.of_text(body.time_code, body.rate, body.monotonic_s, body.source)
+    return store.recordings.note_time_code(id, body.model_dump())
 
 
 @router.post("/{id}/stop", response_model=Recording, summary="Stop a recording", responses=change_problems())
