@@ -6,12 +6,14 @@ key holds domain, topic, type and the type's hash, the payload is CDR, an attach
 publisher, and liveliness tokens make ``ros2 topic list`` know it. Releases before Jazzy have other forms.
 
 A joint whose angle is too uncertain, or held because its sensor fails, is left out of the message; while
-poses are stale or uncalibrated nothing is sent.
+poses are stale or uncalibrated nothing is sent. With a robot's hand as an option the joints are the robot's;
+then nothing is sent either while a rotation that moves it is not usable.
 """
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import struct
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -25,10 +27,14 @@ from glovecal_client.clock import wall_ns
 from glovecal_client.errors import NoAnswer
 from glovecal_client.session import open_client
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.robot_description import RobotDescription
+from glovecal_models.hand.retargeting.robot_follower import RobotFollower
+from glovecal_models.hand.skeleton import Skeleton
 from glovecal_service.bridges.bridge import Bridge, BridgeOptions
 from glovecal_service.bridges.glove_pose import GlovePose
 from glovecal_service.bridges.traffic import Traffic
 
+_log = logging.getLogger(__name__)
 TYPE = "sensor_msgs::msg::dds_::JointState_"
 TYPE_HASH = "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
 NODE = "glovecal"
@@ -52,6 +58,7 @@ class Ros2Bridge(Bridge):
     options: ClassVar[dict[str, str]] = {
         "to": f"HOST:PORT of the ROS 2 router (rmw_zenohd); default {DEFAULT_ROUTER}",
         "domain": f"ROS_DOMAIN_ID, 0 (default) to {LAST_DOMAIN}",
+        "robot": "joints of a robot's hand in place of the person's: shadow, allegro, leap or a URDF file",
     }
 
     def __init__(self, options: BridgeOptions, traffic: Traffic) -> None:
@@ -60,6 +67,8 @@ class Ros2Bridge(Bridge):
         self._domain = options.number("domain", 0, 0, LAST_DOMAIN)
         self._opened = ExitStack()
         self._session: zenoh.Session | None = None
+        self._robot = None if "robot" not in options.more else RobotDescription.named(options.more["robot"])
+        self._followers: dict[str, tuple[Skeleton, RobotFollower | None]] = {}
         self._topics: dict[str, _Topic] = {}
         self._node: zenoh.LivelinessToken | None = None
 
@@ -73,7 +82,8 @@ class Ros2Bridge(Bridge):
         return sum(topic.is_listened_to for topic in list(self._topics.values()))
 
     def send(self, hand: GlovePose) -> None:
-        if hand.state != "live" or self._session is None:
+        radians = hand.radians if self._robot is None else self._robots(hand, self._robot)
+        if hand.state != "live" or self._session is None or radians is None:
             return
         topic = self._topics.get(hand.glove)
         if topic is None:
@@ -81,8 +91,26 @@ class Ros2Bridge(Bridge):
             topic = self._topics[hand.glove] = _Topic.declared(
                 self._session, self._domain, hand.glove, number
             )
-        topic.put(joint_state(hand.pose.wall_ns, ros_name(hand.glove), hand.radians))
+        topic.put(joint_state(hand.pose.wall_ns, ros_name(hand.glove), radians))
         self._traffic.note_departure(hand)
+
+    def _robots(self, hand: GlovePose, robot: RobotDescription) -> dict[str, float] | None:
+        """Of the robot's joints; None where they must not move."""
+        skeleton, pose = hand.meaning.skeleton, hand.pose
+        if skeleton is None or hand.state != "live":
+            self._followers.pop(hand.glove, None)  # it begins anew from where it then is
+            return None
+        if hand.glove not in self._followers or self._followers[hand.glove][0] is not skeleton:
+            try:
+                follower = RobotFollower(skeleton, robot.hand(skeleton.hand, {}))
+            except BadInput as error:
+                _log.warning("glove %s moves no robot: %s", hand.glove, error)
+                follower = None
+            self._followers[hand.glove] = skeleton, follower
+        follower = self._followers[hand.glove][1]
+        if follower is None:
+            return None
+        return follower.radians(hand.meaning.rotations, pose.degrees, pose.usable)
 
     def __enter__(self) -> Ros2Bridge:
         endpoint = f"tcp/{self._host}:{self._port}"

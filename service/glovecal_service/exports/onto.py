@@ -9,11 +9,12 @@ from typing import Protocol
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.robot_description import KINDS, RobotDescription
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_models.names import did_you_mean
 from glovecal_service.exports.character_files import read_character
 from glovecal_service.exports.hand_motion import Content, HandMotion
-from glovecal_service.exports.robot_motion import KINDS, Robot
+from glovecal_service.exports.robot_motion import Robot
 
 _URDF = b"<robot"
 _LOOKED_AT = 4096
@@ -77,7 +78,7 @@ def read_onto(onto: Path | str) -> Onto:
     if isinstance(onto, str):
         if onto not in KINDS:
             raise BadInput(f"no robot hand {onto!r} comes with Glovecal; {did_you_mean(onto, KINDS)}")
-        return Robot(onto)
+        return Robot(RobotDescription(onto))
     if is_robot(onto):
-        return Robot.read(onto, "the robot's file")
+        return Robot(RobotDescription.read(onto, "the robot's file"))
     return read_character(onto, "the character's file")

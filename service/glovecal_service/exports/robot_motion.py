@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from glovecal_models.errors import BadInput
-from glovecal_models.hand.retargeting.bone_names import bones_of
-from glovecal_models.hand.retargeting.robot import LARGEST_URDF, RobotHand, known_robots, urdf_of
+from glovecal_models.hand.retargeting.robot_description import RobotDescription
 from glovecal_models.hand.retargeting.robot_retarget import RobotRetargeting
 from glovecal_models.hand.skeleton import Skeleton
 from glovecal_service.exports.body_motion import whole_angles
@@ -19,34 +18,15 @@ from glovecal_service.exports.hand_motion import Content, HandMotion, blocks
 
 SUFFIXES = (".csv", ".parquet", ".mcap")
 """Of formats in which angles have the names of joints."""
-KINDS = tuple(sorted({name.rpartition("_")[0] for name in known_robots()}))
-"""Robot hands that come with Glovecal."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    kind: str
-    """One of ``KINDS``, or the name of the file."""
-    urdf: str | None = None
-    """Its text, where it is a file's."""
-
-    @classmethod
-    def read(cls, path: Path, name: str) -> Robot:
-        """Raises BadInput for a file that is too large, or no text."""
-        if path.stat().st_size > LARGEST_URDF:
-            raise BadInput(
-                f"{name} has {path.stat().st_size} bytes; a robot's URDF has {LARGEST_URDF} at most"
-            )
-        try:
-            return cls(name, path.read_text("utf-8"))
-        except UnicodeDecodeError as error:
-            raise BadInput(f"{name} is no text; give a robot's URDF, or a character (.glb)") from error
+    description: RobotDescription
 
     def shown(self, skeleton: Skeleton, bones: Mapping[str, str]) -> RobotRetargeting:
         """Raises BadInput where the robot has no such hand."""
-        name = self.kind if self.urdf is not None else f"{self.kind}_{skeleton.hand}"
-        text = urdf_of(name) if self.urdf is None else self.urdf
-        return RobotRetargeting(skeleton, RobotHand.from_urdf(text, name, bones_of(bones, skeleton.hand)))
+        return RobotRetargeting(skeleton, self.description.hand(skeleton.hand, bones))
 
     def write(
         self, motions: Sequence[HandMotion], content: Content, path: Path, bones: Mapping[str, str]
@@ -66,5 +46,5 @@ class Robot:
         degrees[np.isnan(motion.degrees).all(axis=1)] = np.nan
         return replace(
             motion, rotations=shown.robot.free, degrees=degrees, sd_deg=np.full_like(degrees, np.nan),
-            flags=None, notes={**motion.notes, "robot": self.kind},
+            flags=None, notes={**motion.notes, "robot": self.description.name},
         )  # fmt: skip

@@ -22,6 +22,7 @@ from zenoh_ros2_sdk.attachment import Attachment
 
 from glovecal_client.session import open_client, open_router
 from glovecal_client.wire.pose import RotationFlag
+from glovecal_models.hand.retargeting.robot import RobotHand
 from glovecal_service.bridges.ros2 import TYPE_HASH, joint_state, ros_name, topic_of
 
 RECEIVER = Path(__file__).with_name("ros2_receiver.py")
@@ -94,6 +95,42 @@ def test_a_node_lists_the_topics_and_gets_both_hands_in_radians(stage: Stage) ->
             count = len(right)
             eventually(lambda: left[-1]["stamp_ns"] > right[-1]["stamp_ns"] + 10**9, "a second of the left")
             assert len(right) == count, "nothing stale is sent"
+
+
+def test_a_robots_joints_are_sent_while_every_rotation_that_moves_it_is_usable(stage: Stage) -> None:
+    stage.show(right={"angles": FIST}, left={"angles": FIST})
+    router = free_endpoint()
+    port = int(router.rpartition(":")[2])
+    options = ("--to", f"127.0.0.1:{port}", "--option", "robot=leap")
+    limits = dict(zip(RobotHand.known("leap_right").free, RobotHand.known("leap_right").limits, strict=True))
+    with open_router([router]), running_bridge(stage, "ros2", *options) as bridge:
+
+        def stands_still() -> bool:
+            """Between two lines that the bridge told of itself."""
+            of_right = [line.get("gloves", {}).get("right") for line in bridge.lines[-2:]]
+            if len(of_right) < 2 or None in of_right:
+                return False
+            before, now = of_right
+            return before["received"] < now["received"] and before["sent"] == now["sent"]
+
+        eventually(lambda: bridge.counts("right").get("sent"), "the topic is there")
+        with receiving(port, topic_of("right")) as right:
+            sent = eventually(lambda: right[1:2], "the right hand")[0]["position"]
+            assert set(sent) == set(limits)
+            for name, (low, high) in limits.items():
+                assert low - 1e-9 <= sent[name] <= high + 1e-9
+            assert sent["if_pip"] > 1.2
+            eventually(
+                lambda: "left moves no robot" in bridge.complaints, "of LEAP there is a right hand only"
+            )
+            assert not bridge.counts("left").get("sent")
+            stage.show(right={"angles": FIST, "rotation_flags": {"M_PIP": int(RotationFlag.TOO_UNCERTAIN)}})
+            eventually(stands_still, "nothing moves the robot")
+            count = len(right)
+            stage.show(right={"angles": FIST})
+            eventually(lambda: len(right) > count + 10, "it follows again")
+    said = refused(stage, "ros2", "--option", "robot=lepa")
+    assert "did you mean 'leap'" in said
 
 
 def test_a_message_carries_number_time_and_publisher(stage: Stage) -> None:

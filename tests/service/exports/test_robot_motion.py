@@ -17,13 +17,13 @@ from posed_hands import moving
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.bones import PHALANGES
 from glovecal_models.hand.retargeting.robot import RobotHand
+from glovecal_models.hand.retargeting.robot_description import KINDS
 from glovecal_models.hand.retargeting.robot_retarget import RobotRetargeting
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, FINGERS, HANDS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.character_fit import CharacterFit
 from glovecal_service.exports.onto import is_robot, read_onto
 from glovecal_service.exports.robot_hand import urdf
-from glovecal_service.exports.robot_motion import KINDS
 
 OWN_LINKS = {"hand": "W_FLEX"} | {
     f"{finger}_{part}": joint

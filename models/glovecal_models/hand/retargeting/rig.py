@@ -1,8 +1,9 @@
 """Another skeleton in its rest pose: where its bones are and how they stand, and which are a hand's.
 
 Bones are found by their names, whatever the convention: a side (left, right, l, r), a finger (by its name, or
-all five numbered from the thumb on), and either a number or the anatomical word. What a number means is not trusted: some rigs count from the knuckle, others
-from the metacarpal, and some give the fingertip a bone. The chain and where it begins tell.
+all five numbered from the thumb on), and either a number or the anatomical word. What a number means is not
+trusted: some rigs count from the knuckle, others from the metacarpal, and some give the fingertip a bone. The
+chain and where it begins tell.
 """
 
 from __future__ import annotations

@@ -54,6 +54,11 @@ class RobotRetargeting:
         return self.robot.fingers
 
     @property
+    def turns_wrist(self) -> bool:
+        """Whether a joint moves the hand itself."""
+        return bool(self._moved[-1].any())
+
+    @property
     def palm(self) -> np.ndarray:
         """(3, 3) axes of the hand in which joints are told: its own."""
         return np.eye(3)
@@ -236,7 +241,7 @@ class RobotRetargeting:
             apart = tips[:, 1:] - tips[:, :1] - gaps @ turned.swapaxes(1, 2)
             rows.append(scale[..., None, None] * (tip_moves[:, 1:] - tip_moves[:, :1]))
             lacks.append(scale[..., None] * apart)
-        if self._moved[-1].any():
+        if self.turns_wrist:
             wanted = self._straight @ hand
             for column in (0, 2):
                 own = turned[:, None, :, column]

@@ -128,8 +128,8 @@ def motion(
 ) -> None:
     """Write one hand or both as motion: BVH for animation (on a body at rest), TRC for OpenSim and
     MotionBuilder, CSV or Parquet for analysis."""
+    from glovecal_models.hand.retargeting.robot_description import KINDS
     from glovecal_service.exports.formats import format_of
-    from glovecal_service.exports.robot_motion import KINDS
 
     chosen = format_of(file.name)
     if len(take) > MOST_HANDS:

@@ -13,6 +13,7 @@ from starlette.background import BackgroundTask
 
 from glovecal_client.operating_system import name_for_a_file
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.retargeting.robot_description import KINDS
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.progress import Cancel
 from glovecal_service.exports.body_markers import Wrist
@@ -23,7 +24,7 @@ from glovecal_service.exports.motion_file import Body as BodyFile
 from glovecal_service.exports.motion_file import HandTake, MotionFile, fits, write_motion
 from glovecal_service.exports.onto import is_robot
 from glovecal_service.exports.resampling import Resampling
-from glovecal_service.exports.robot_motion import KINDS, SUFFIXES
+from glovecal_service.exports.robot_motion import SUFFIXES
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time

@@ -106,7 +106,7 @@ class TakeOnto:
                     self._show_fit(hand)
                 with ui.element("div").classes("page-acts"):
                     if self._bones:
-                        act("Bones as they were found", self._as_found)
+                        act("Bones as they were found", self._undo)
                     act("Leave it out", partial(self._leave_out, "Nothing else moves."))
 
     def _refused(self, sentence: str) -> None:
@@ -114,11 +114,11 @@ class TakeOnto:
         self._tell(sentence)
         if self._bones:
             with self._fit:
-                act("Bones as they were found", self._as_found)
+                act("Bones as they were found", self._undo)
         else:
             self._onto = None
 
-    async def _as_found(self) -> None:
+    async def _undo(self) -> None:
         self._bones = {}
         await self._look_again()
 
