@@ -10,7 +10,12 @@ from lerobot.teleoperators.teleoperator import Teleoperator
 
 from lerobot_teleoperator_glovecal.config_glovecal import GlovecalTeleoperatorConfig
 from lerobot_teleoperator_glovecal.glove_link import GloveLink
-from lerobot_teleoperator_glovecal.joint_actions import JointActions
+from lerobot_teleoperator_glovecal.joint_actions import HandMapping, JointActions, SummedRotations
+
+
+def mapping_of(config: GlovecalTeleoperatorConfig) -> HandMapping:
+    """How the configured robot is told what the hand does. Raises ValueError."""
+    return SummedRotations(config.actions)
 
 
 class GlovecalTeleoperator(Teleoperator):
@@ -23,14 +28,16 @@ class GlovecalTeleoperator(Teleoperator):
         """Raises ValueError for actions that cannot be."""
         super().__init__(config)
         self.config = config
+        mapping = mapping_of(config)
+        self._names = tuple(mapping.start)
         self._actions = JointActions(
-            config.glove, config.actions, config.hold_s, config.ramp_s, config.allow_simulated
+            config.glove, mapping, config.hold_s, config.ramp_s, config.allow_simulated
         )
         self._link = GloveLink(self._actions, site=config.site, endpoint=config.connect)
 
     @property
     def action_features(self) -> dict[str, type]:
-        return dict.fromkeys(self.config.actions, float)
+        return dict.fromkeys(self._names, float)
 
     @property
     def feedback_features(self) -> dict[str, type]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from glovecal_client import Pose
 from glovecal_client.wire.pose import PoseFlag, RotationFlag
@@ -47,20 +48,29 @@ class JointAction:
         return min(max(value, self.low), self.high)
 
 
-@dataclass
-class JointActions:
-    """All of a robot's actions, by name, and whether the hand may move them."""
+class HandMapping(Protocol):
+    """What a robot is told, made of a hand's rotations."""
 
-    glove: str
+    @property
+    def rotations(self) -> set[str]:
+        """That it is made of: each has to be there and to be trusted."""
+        ...
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Where the robot is before it follows, by the names of its actions."""
+        ...
+
+    def values(self, degrees: Mapping[str, float]) -> dict[str, float]:
+        """Its actions, within their limits, where the hand's rotations are these."""
+        ...
+
+
+@dataclass
+class SummedRotations:
+    """Each action is a sum of rotations."""
+
     actions: Mapping[str, JointAction]
-    hold_s: float = 0.2
-    ramp_s: float = 2.0
-    allow_simulated: bool = False
-    _began_s: float | None = field(default=None, init=False)
-    _trusted_s: float = field(default=0.0, init=False)
-    _last: dict[str, float] = field(default_factory=dict, init=False)
-    _ended: str = field(default="", init=False)
-    _model: str | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Raises ValueError."""
@@ -69,8 +79,31 @@ class JointActions:
 
     @property
     def rotations(self) -> set[str]:
-        """That actions are made of."""
         return {name for action in self.actions.values() for name in action.gains}
+
+    @property
+    def start(self) -> dict[str, float]:
+        return {name: action.start for name, action in self.actions.items()}
+
+    def values(self, degrees: Mapping[str, float]) -> dict[str, float]:
+        return {name: action.value(degrees) for name, action in self.actions.items()}
+
+
+@dataclass
+class JointActions:
+    """A robot's actions from pose to pose, and whether the hand may move them."""
+
+    glove: str
+    mapping: HandMapping
+    hold_s: float = 0.2
+    ramp_s: float = 2.0
+    allow_simulated: bool = False
+    _began_s: float | None = field(default=None, init=False)
+    _trusted_s: float = field(default=0.0, init=False)
+    _start: dict[str, float] = field(default_factory=dict, init=False)
+    _last: dict[str, float] = field(default_factory=dict, init=False)
+    _ended: str = field(default="", init=False)
+    _model: str | None = field(default=None, init=False)
 
     def begin(self, pose: Pose | None, names: tuple[str, ...], is_late: bool) -> None:
         """Follow from now on. Raises GloveNotUsable with what has to be done first."""
@@ -78,7 +111,7 @@ class JointActions:
         if why:
             raise GloveNotUsable(f"glove {self.glove} cannot move a robot: {why}")
         self._began_s, self._ended, self._model = None, "", None if pose is None else pose.model_sha256
-        self._last = {name: action.start for name, action in self.actions.items()}
+        self._start = self._last = self.mapping.start
 
     def at(self, now_s: float, pose: Pose | None, names: tuple[str, ...], is_late: bool) -> dict[str, float]:
         """The actions at ``now_s`` (seconds of one clock); ``is_late``: no new pose came
@@ -99,8 +132,8 @@ class JointActions:
             degrees = dict(zip(names, pose.degrees.tolist(), strict=True))
             part = 1.0 if self.ramp_s <= 0 else min(1.0, (now_s - self._began_s) / self.ramp_s)
             self._last = {
-                name: (1.0 - part) * action.start + part * action.value(degrees)
-                for name, action in self.actions.items()
+                name: (1.0 - part) * self._start[name] + part * value
+                for name, value in self.mapping.values(degrees).items()
             }
         elif now_s - self._trusted_s > self.hold_s:
             self._ended = (
@@ -121,7 +154,7 @@ class JointActions:
             return "it is simulated; to try it all the same, set allow_simulated."
         if pose.flags & PoseFlag.STALE or is_late:
             return f"its pose is stale: nothing new comes from the glove. {watch}"
-        missing = sorted(self.rotations - set(names))
+        missing = sorted(self.mapping.rotations - set(names))
         if missing:
             return (
                 f"its model has no rotation {missing[0]}, of which an action is made; it has "
@@ -130,7 +163,7 @@ class JointActions:
         return self._problem_of_rotations(pose, names, watch)
 
     def _problem_of_rotations(self, pose: Pose, names: tuple[str, ...], watch: str) -> str:
-        wanted = self.rotations
+        wanted = self.mapping.rotations
         for name, degrees, sd_deg, flags in zip(
             names, pose.degrees.tolist(), pose.deviations.tolist(), pose.rotation_flags.tolist(), strict=True
         ):

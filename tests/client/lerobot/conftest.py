@@ -29,4 +29,4 @@ config.__dict__["TeleoperatorConfig"] = TeleoperatorConfig
 teleoperator.__dict__["Teleoperator"] = Teleoperator
 for module in (ModuleType("lerobot"), ModuleType("lerobot.teleoperators"), config, teleoperator):
     sys.modules.setdefault(module.__name__, module)
-sys.path[:0] = [str(PLUG_IN), str(Path(__file__).parent)]
+sys.path[:0] = [str(PLUG_IN), str(PLUG_IN / "examples"), str(Path(__file__).parent)]

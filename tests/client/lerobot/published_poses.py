@@ -22,11 +22,11 @@ POSE = Pose(
 class Glove:
     """Publishes poses 100 times a second, as the service does, until told otherwise."""
 
-    def __init__(self, endpoint: str) -> None:
-        self.pose: Pose | None = replace(POSE, flags=PoseFlag.SIMULATED)
+    def __init__(self, endpoint: str, pose: Pose = POSE, names: tuple[str, ...] = NAMES) -> None:
+        self.pose: Pose | None = replace(pose, flags=PoseFlag.SIMULATED)
         self._keys, self._stop, self._open = GloveKeys("lab", "right"), threading.Event(), ExitStack()
         self._session = self._open.enter_context(open_client([endpoint], wait_s=60))
-        self._meta = json.dumps({"model": MODEL, "rotations": NAMES}).encode()
+        self._meta = json.dumps({"model": MODEL, "rotations": names}).encode()
         self._session.put(self._keys.pose_meta, self._meta)
         self._open.callback(
             self._session.declare_queryable(

@@ -16,7 +16,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lerobot_teleoperator_glovecal.joint_actions import GloveNotUsable, JointAction, JointActions
+from lerobot_teleoperator_glovecal.joint_actions import (
+    GloveNotUsable,
+    JointAction,
+    JointActions,
+    SummedRotations,
+)
 from loopback import eventually, free_endpoint
 from published_poses import DEGREES, NAMES, POSE, Glove
 
@@ -30,10 +35,11 @@ ACTIONS = {
     "index.pos": JointAction({"I_PIP": 1.0, "I_MCP": 0.5}, offset=10.0, low=0.0, high=50.0),
     "middle.pos": JointAction({"M_PIP": -1.0}, rest=5.0),
 }
+MAPPING = SummedRotations(ACTIONS)
 
 
 def following(**options: Any) -> JointActions:
-    actions = JointActions("right", ACTIONS, **options)
+    actions = JointActions("right", MAPPING, **options)
     actions.begin(POSE, NAMES, False)
     return actions
 
@@ -102,27 +108,27 @@ def test_what_cannot_be_trusted_is_held_then_ends_it(kind: str) -> None:
 def test_what_cannot_be_trusted_does_not_begin(kind: str) -> None:
     pose, is_late, why = BAD[kind]
     with pytest.raises(GloveNotUsable, match=f"glove right cannot move a robot: .*{why}"):
-        JointActions("right", ACTIONS).begin(pose, NAMES, is_late)
+        JointActions("right", MAPPING).begin(pose, NAMES, is_late)
 
 
 def test_flags_of_rotations_that_move_nothing_do_not_count() -> None:
-    actions = JointActions("right", {"middle.pos": ACTIONS["middle.pos"]}, ramp_s=0.0)
+    actions = JointActions("right", SummedRotations({"middle.pos": ACTIONS["middle.pos"]}), ramp_s=0.0)
     faulty = flagged("I_PIP", RotationFlag.FAULTY_SENSOR)
     actions.begin(faulty, NAMES, False)
     assert actions.at(0.0, faulty, NAMES, False) == {"middle.pos": -60.0}
-    allowed = JointActions("right", ACTIONS, allow_simulated=True)
+    allowed = JointActions("right", MAPPING, allow_simulated=True)
     allowed.begin(replace(POSE, flags=PoseFlag.SIMULATED), NAMES, False)
 
 
 def test_wrong_configurations_are_refused() -> None:
     with pytest.raises(ValueError, match="name each action"):
-        JointActions("right", {})
+        SummedRotations({})
     with pytest.raises(ValueError, match="low < high, not 3 and 1"):
         JointAction({"I_PIP": 1.0}, low=3, high=1)
     with pytest.raises(ValueError, match="must be finite"):
         JointAction({"I_PIP": math.inf})
     with pytest.raises(GloveNotUsable, match=r"no rotation R_PIP, .*; it has I_MCP"):
-        JointActions("right", {"a": JointAction({"R_PIP": 1.0})}).begin(POSE, NAMES, False)
+        JointActions("right", SummedRotations({"a": JointAction({"R_PIP": 1.0})})).begin(POSE, NAMES, False)
 
 
 class MujocoHand:

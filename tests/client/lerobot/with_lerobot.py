@@ -71,6 +71,8 @@ class StandIns(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 class Robot:
     """Keeps what it is sent."""
 
+    name = "hand"
+
     def __init__(self, names: list[str]) -> None:
         self.action_features = dict.fromkeys(names, float)
         self.sent: list[dict[str, float]] = []
