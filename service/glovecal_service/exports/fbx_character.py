@@ -1,7 +1,6 @@
 """A character as a binary FBX file (7.4 to 7.7).
 
-Where bones are and how they stand at rest says the bind pose; what it leaves out follows from a node's own
-turn, place and size, by the formula of FBX with its turns before and after, pivots and order of angles.
+How bones stand at rest says the bind pose; what it leaves out follows from a model's own properties.
 """
 
 from __future__ import annotations
@@ -37,6 +36,7 @@ from glovecal_service.exports.fbx_animation import (
     euler_curves,
     euler_degrees,
 )
+from glovecal_service.exports.fbx_models import NUMBERS, VECTORS, Model, Placed
 from glovecal_service.exports.fbx_records import (
     BETWEEN_NAME_AND_KIND,
     RIGHT,
@@ -46,8 +46,6 @@ from glovecal_service.exports.fbx_records import (
 )
 from glovecal_service.exports.hand_motion import HandMotion
 
-ORDERS = ("xyz", "xzy", "yzx", "yxz", "zxy", "zyx")
-"""Of angles about fixed axes, by FBX's number; a seventh that it has is the first."""
 AXES = ("CoordAxis", "UpAxis", "FrontAxis")
 """To the right, up, and to who looks."""
 LARGEST_ID = (1 << 62) - 1
@@ -55,70 +53,11 @@ LARGEST_COUNT = (1 << 31) - 1
 
 
 @dataclass(frozen=True)
-class _Model:
-    id: int
-    name: str
-    place: Mapping[str, tuple[float, ...]]
-    """Properties that say where it is and how it is turned."""
-
-    @cached_property
-    def order(self) -> str:
-        number = int(self._value("RotationOrder", 0.0)[0]) if self._has_own_axes else 0
-        return ORDERS[number] if 0 <= number < len(ORDERS) else ORDERS[0]
-
-    @cached_property
-    def before(self) -> np.ndarray:
-        """(3, 3) the turn that stands before the animated one."""
-        return self._turn("PreRotation", ORDERS[0]) if self._has_own_axes else np.eye(3)
-
-    @cached_property
-    def after(self) -> np.ndarray:
-        """(3, 3) the turn whose inverse stands after the animated one."""
-        return self._turn("PostRotation", ORDERS[0]) if self._has_own_axes else np.eye(3)
-
-    @cached_property
-    def matrix(self) -> np.ndarray:
-        """(4, 4) against its parent: T Roff Rp Rpre R Rpost^-1 Rp^-1 Soff Sp S Sp^-1."""
-        turned = self.before @ self._turn(TURN, self.order) @ self.after.T
-        size = np.diag(self._value("Lcl Scaling", 1.0))
-        pivot, size_pivot = self._value("RotationPivot", 0.0), self._value("ScalingPivot", 0.0)
-        place = self._value("Lcl Translation", 0.0) + self._value("RotationOffset", 0.0) + pivot
-        inner = self._value("ScalingOffset", 0.0) + size_pivot - pivot - size @ size_pivot
-        matrix = np.eye(4)
-        matrix[:3, :3] = turned @ size
-        matrix[:3, 3] = place + turned @ inner
-        return matrix
-
-    @property
-    def _has_own_axes(self) -> bool:
-        return bool(self._value("RotationActive", 0.0)[0])
-
-    def _turn(self, name: str, order: str) -> np.ndarray:
-        from scipy.spatial.transform import (
-            Rotation,
-        )  # slow to load, and every command that exports loads this
-
-        angles = self._value(name, 0.0)
-        return Rotation.from_euler(
-            order, angles[["xyz".index(axis) for axis in order]], degrees=True
-        ).as_matrix()
-
-    def _value(self, name: str, otherwise: float) -> np.ndarray:
-        values = self.place.get(name, ())
-        return np.array(values if len(values) else (otherwise,) * 3)
-
-
-VECTORS = ("Lcl Translation", TURN, "Lcl Scaling", "PreRotation", "PostRotation", "RotationOffset",
-           "RotationPivot", "ScalingOffset", "ScalingPivot")  # fmt: skip
-NUMBERS = ("RotationOrder", "RotationActive")
-
-
-@dataclass(frozen=True)
 class FbxCharacter(Character):
     suffix = ".fbx"
     path: Path
     name: str
-    models: tuple[_Model, ...] = field(repr=False)
+    models: tuple[Model, ...] = field(repr=False)
     parents: Mapping[int, int] = field(repr=False)
     """By id."""
     bind: Mapping[int, np.ndarray] = field(repr=False)
@@ -150,7 +89,7 @@ class FbxCharacter(Character):
             highest = max(highest, id) if isinstance(id, int) else highest
             if record.name == b"Model":
                 name = _text(next(values)).partition(BETWEEN_NAME_AND_KIND)[0]
-                models.append(_Model(_integer(id), name, usual | dict(_properties(file, record))))
+                models.append(Model(_integer(id), name, usual | dict(_properties(file, record))))
                 if len(models) > MOST_LISTED:
                     raise BadInput(
                         f"{file.name} has more than {MOST_LISTED} nodes; export the character alone"
@@ -165,7 +104,7 @@ class FbxCharacter(Character):
             raise ValueError("two nodes have one number")
         return cls(
             path, file.name,
-            tuple(_Model(model.id, name, model.place) for model, name in zip(models, names, strict=True)),
+            tuple(Model(model.id, name, model.properties) for model, name in zip(models, names, strict=True)),
             dict(_connections(file, tops[b"Connections"], own)),
             {id: matrix for pose in poses for id, matrix in _bind(file, pose) if id in own},
             highest + 1,
@@ -179,32 +118,29 @@ class FbxCharacter(Character):
             raise BadInput(f"the nodes of {self.name} are not as FBX has them. {RIGHT}") from error
 
     def _bones(self) -> Iterator[RigBone]:
-        below: dict[int | None, list[_Model]] = {}
+        below: dict[int | None, list[Model]] = {}
         for model in self.models:
             below.setdefault(self.parents.get(model.id), []).append(model)
-        waiting: list[tuple[_Model, _Model | None, int, np.ndarray]]
-        waiting = [(model, None, 0, np.eye(4)) for model in below.get(None, [])]
+        waiting: list[tuple[Model, Model | None, int, Placed]]
+        waiting = [(model, None, 0, Placed.origin()) for model in below.get(None, [])]
         while waiting:
             model, parent, depth, above = waiting.pop()
             if depth > DEEPEST:
                 raise ValueError("no tree")
-            world = above @ self._at_rest(model, parent)
-            axes = axes_of(world)
-            x, y, z = world[:3, 3].tolist()
-            yield RigBone(model.name, None if parent is None else parent.name, (x, y, z), axes)
-            waiting += [(child, model, depth + 1, world) for child in below.get(model.id, ())]
+            placed = self._placed(model, parent, above)
+            x, y, z = placed.world[:3, 3].tolist()
+            above_name = None if parent is None else parent.name
+            yield RigBone(model.name, above_name, (x, y, z), axes_of(placed.world))
+            waiting += [(child, model, depth + 1, placed) for child in below.get(model.id, ())]
 
-    def _at_rest(self, model: _Model, parent: _Model | None) -> np.ndarray:
-        """(4, 4) against its parent: as both are in the bind pose, else as the file has them."""
-        if model.id not in self.bind:
-            return model.matrix
-        if parent is None:
-            return self.bind[model.id]
-        if parent.id not in self.bind:
-            return model.matrix
-        against = np.linalg.solve(self.bind[parent.id], self.bind[model.id])
-        axes_of(against)
-        return against
+    def _placed(self, model: Model, parent: Model | None, above: Placed) -> Placed:
+        """As both are in the bind pose, else as the file has them."""
+        own = self.bind.get(model.id)
+        if own is not None and parent is None:
+            return above.at(own)
+        if own is None or parent is None or parent.id not in self.bind:
+            return above.below(model)
+        return above.at(np.linalg.solve(self.bind[parent.id], own))
 
     def write_hands(self, motions: Sequence[HandMotion], hands: Sequence[MovingHand], path: Path) -> None:
         by_name = {model.name: model for model in self.models}
@@ -226,7 +162,7 @@ class FbxCharacter(Character):
             animation = Animation(np.int64(self.first_free), time_s, animated, notes_of(motions))
             _write(file, Records(stream, file.version), animation)
 
-    def _still(self, turning: Collection[str], models: Mapping[str, _Model]) -> Iterator[Animated]:
+    def _still(self, turning: Collection[str], models: Mapping[str, Model]) -> Iterator[Animated]:
         """Bones between two that turn: at rest, also where the file has another pose."""
         between: dict[str, None] = {}
         for name in turning:
@@ -307,7 +243,7 @@ def _more(file: RecordFile, count: Record, added: int) -> int:
     return min((before if isinstance(before, int) else 0) + added, LARGEST_COUNT)
 
 
-def _own_turns(hands: Sequence[MovingHand], models: Sequence[_Model]) -> Iterator[tuple[slice, np.ndarray]]:
+def _own_turns(hands: Sequence[MovingHand], models: Sequence[Model]) -> Iterator[tuple[slice, np.ndarray]]:
     """What is animated of each node's turn: without what stands before and after."""
     before, after = (np.array([getattr(model, name) for model in models]) for name in ("before", "after"))
     for parts in zip(*(hand.turns() for hand in hands), strict=True):

@@ -94,13 +94,13 @@ def _grouped(motion: HandMotion, names: Sequence[str], values: np.ndarray) -> di
     grouped = {channel for own in groups.values() for channel in own}
     groups |= {name: (name,) for name in names if name not in grouped}
     nothing = np.zeros(len(motion.time_s))
-    found = {}
+    triples = {}
     for name, own in groups.items():
         triple = [channels.get(channel, nothing) for channel in (*own, "", "")[:3]]
         columns = np.column_stack(triple)
         missing = np.isnan(columns).any(axis=1, keepdims=True)
-        found[f"{motion.label}_{name}"] = np.where(missing, np.nan, columns)
-    return found
+        triples[f"{motion.label}_{name}"] = np.where(missing, np.nan, columns)
+    return triples
 
 
 KEYS = (

@@ -112,7 +112,8 @@ def write_fbx_character(
             for bone in bones:
                 with records.object("Model", ids[bone.name], bone.name, "LimbNode"):
                     bent = is_posed and any(word in bone.name.lower() for word in ("index", "metacarpal"))
-                    records.properties(*_placed(rig, bone, rng, bent_deg=20.0 if bent else 0.0))
+                    arm_size = 1.0 if has_bind_pose else 1.2
+                    records.properties(*_placed(rig, bone, rng, 20.0 if bent else 0.0, arm_size))
             if has_bind_pose:
                 with records.object("Pose", np.int64(91), "bind", "BindPose"):
                     for bone in bones:
@@ -135,7 +136,9 @@ def write_fbx_character(
     return rig
 
 
-def _placed(rig: Rig, bone: RigBone, rng: np.random.Generator, bent_deg: float) -> list[tuple]:
+def _placed(
+    rig: Rig, bone: RigBone, rng: np.random.Generator, bent_deg: float, arm_size: float
+) -> list[tuple]:
     parent = rig.by_name.get(bone.parent or "")
     above = np.eye(3) if parent is None else parent.orientation
     turn = above.T @ bone.orientation @ Rotation.from_euler("x", bent_deg, degrees=True).as_matrix()
@@ -152,8 +155,9 @@ def _placed(rig: Rig, bone: RigBone, rng: np.random.Generator, bent_deg: float) 
         return (name, name if name.startswith("Lcl") else "Vector3D", "", "A", *map(float, values))
 
     return [
-        ("RotationOrder", "enum", "", "", number), ("InheritType", "enum", "", "", 1),
+        ("RotationOrder", "enum", "", "", number), ("InheritType", "enum", "", "", int(rng.integers(3))),
         row("PreRotation", before), row("PostRotation", after), row("RotationOffset", offset),
         row("RotationPivot", pivot), row("ScalingOffset", size_offset), row("ScalingPivot", size_pivot),
-        row("Lcl Translation", place), row("Lcl Rotation", turned), row("Lcl Scaling", [1.0, 1.0, 1.0]),
+        row("Lcl Translation", place), row("Lcl Rotation", turned),
+        row("Lcl Scaling", [arm_size if "forearm" in bone.name else 1.0] * 3),
     ]  # fmt: skip

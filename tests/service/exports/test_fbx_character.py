@@ -58,8 +58,9 @@ def read_by_another(path: Path, time_s: float | None = None) -> tuple[dict[str, 
 
 
 def away_deg(one: np.ndarray, other: np.ndarray) -> float:
-    """Between two orientations."""
-    return float(np.degrees(np.linalg.norm(one - other) / np.sqrt(2)))
+    """Between two orientations, of any size."""
+    axes = [each / np.linalg.norm(each, axis=0) for each in (one, other)]
+    return float(np.degrees(np.linalg.norm(axes[0] - axes[1]) / np.sqrt(2)))
 
 
 VARIANTS = {

@@ -18,6 +18,7 @@ import numpy as np
 import pxr.Usd
 import pxr.UsdGeom
 import pxr.UsdSkel
+import pxr.UsdValidation
 import pybvh
 import pygltflib
 import pytest
@@ -130,6 +131,15 @@ def read_usd(path: Path, time_s: float) -> Places:
 READERS: dict[str, Callable[[Path, float], Places]] = {
     ".bvh": read_bvh, ".glb": read_glb, ".fbx": read_fbx, ".usda": read_usd,
 }  # fmt: skip
+
+
+def test_openusds_validators_have_nothing_to_say(tmp_path: Path) -> None:
+    FORMATS[".usda"].write([moving("R"), moving("L")], "joints", tmp_path / "both.usda")
+    validators = USD.UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert len(validators) > 20
+    stage = USD.Usd.Stage.Open(str(tmp_path / "both.usda"))
+    complaints = USD.UsdValidation.ValidationContext(validators).Validate(stage)
+    assert [complaint.GetMessage() for complaint in complaints] == []
 
 
 @pytest.mark.parametrize("palm", ["rigid", "arching"])
