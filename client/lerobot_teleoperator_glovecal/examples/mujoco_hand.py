@@ -3,9 +3,10 @@
     glovecal subject robot anna hand.xml
     python mujoco_hand.py hand.xml dataset --glove right --seconds 10
 
-Any MJCF will do: ``--map FILE`` says of which rotations each of its joints (or actuators) is made, as the
-teleoperator's ``actions``; without it joints follow the rotations whose names they have. Needs ``mujoco``
-and ``pyarrow`` beside LeRobot and the plug-in. When the glove cannot be trusted the recording ends there.
+Any MJCF will do: ``--robot shadow`` (allegro, leap, or its URDF) for one that is such a hand; ``--map FILE``
+says of which rotations each of its joints (or actuators) is made, as the teleoperator's ``actions``; without
+either joints follow the rotations whose names they have. Needs ``mujoco`` and ``pyarrow`` beside LeRobot and
+the plug-in. When the glove cannot be trusted the recording ends there.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
@@ -44,6 +45,9 @@ class MujocoHand:
         driven = {actuator.name for actuator in spec.actuators}
         if names is None:
             names = [f"{name}{SUFFIX}" for name in hinges if name not in held]
+        for actuator in list(spec.actuators):
+            if f"{actuator.name}{SUFFIX}" not in names:
+                spec.delete(actuator)  # two that are told apart would pull against each other
         for name in (each.removesuffix(SUFFIX) for each in names):
             if name not in driven and name not in hinges:
                 raise ValueError(f"{model.name} has no joint or actuator {name}; it has {', '.join(hinges)}")
@@ -108,6 +112,8 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("model", type=Path, help="the hand, MJCF")
     parser.add_argument("dataset", type=Path, help="folder to write; must not exist")
     parser.add_argument("--map", type=Path, help="JSON: the teleoperator's actions by the model's joints")
+    parser.add_argument("--robot", default="", help="what hand it is: shadow, allegro, leap or a URDF file")
+    parser.add_argument("--side", default="right", help="of the robot's hand: right or left")
     parser.add_argument("--glove", default="right")
     parser.add_argument("--connect", default="tcp/127.0.0.1:7447", help="the service's zenoh endpoint")
     parser.add_argument("--seconds", type=float, default=10.0)
@@ -121,13 +127,17 @@ def main(words: list[str] | None = None) -> int:
     if options.map is not None:
         written = json.loads(options.map.read_text(encoding="utf-8"))
         mapped = {name: JointAction(**action) for name, action in written.items()}
-    hand = MujocoHand(options.model, None if mapped is None else list(mapped))
-    teleoperator = GlovecalTeleoperator(
-        GlovecalTeleoperatorConfig(
-            glove=options.glove, actions=mapped or own_rotations(hand), connect=options.connect,
-            allow_simulated=options.allow_simulated,
-        )
+    config = GlovecalTeleoperatorConfig(
+        glove=options.glove, actions=mapped or {}, robot=options.robot, side=options.side,
+        connect=options.connect, allow_simulated=options.allow_simulated,
     )  # fmt: skip
+    if options.robot:
+        teleoperator = GlovecalTeleoperator(config)
+        hand = MujocoHand(options.model, list(teleoperator.action_features))
+    else:
+        hand = MujocoHand(options.model, None if mapped is None else list(mapped))
+        config.actions = mapped or own_rotations(hand)
+        teleoperator = GlovecalTeleoperator(config)
     try:
         teleoperator.connect()
         episode, why = record(teleoperator, hand, options.seconds, options.fps)

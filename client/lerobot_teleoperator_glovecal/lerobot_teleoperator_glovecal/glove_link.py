@@ -65,9 +65,10 @@ class GloveLink:
             return None, (), True
         if pose.model_sha256 != self._named_model or len(self._names) != len(pose.degrees):
             try:
-                self._names = (
-                    self._subscriber.rotations(pose, timeout_s=ask_for_s) if len(pose.degrees) else ()
-                )
+                meta = self._subscriber.meta(pose, timeout_s=ask_for_s) if len(pose.degrees) else {}
+                self._names = tuple(map(str, meta.get("rotations", ())))
+                if meta:
+                    self._actions.mapping.know(meta)
                 self._named_model = pose.model_sha256
             except NoAnswer:
                 return None, (), True

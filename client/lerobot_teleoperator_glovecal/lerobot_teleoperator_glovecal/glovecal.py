@@ -11,11 +11,16 @@ from lerobot.teleoperators.teleoperator import Teleoperator
 from lerobot_teleoperator_glovecal.config_glovecal import GlovecalTeleoperatorConfig
 from lerobot_teleoperator_glovecal.glove_link import GloveLink
 from lerobot_teleoperator_glovecal.joint_actions import HandMapping, JointActions, SummedRotations
+from lerobot_teleoperator_glovecal.robot_joints import RobotJoints
 
 
 def mapping_of(config: GlovecalTeleoperatorConfig) -> HandMapping:
     """How the configured robot is told what the hand does. Raises ValueError."""
-    return SummedRotations(config.actions)
+    if not config.robot:
+        return SummedRotations(config.actions)
+    if config.actions:
+        raise ValueError("robot and actions: give one of them")
+    return RobotJoints(config.robot, config.side, config.unit)
 
 
 class GlovecalTeleoperator(Teleoperator):

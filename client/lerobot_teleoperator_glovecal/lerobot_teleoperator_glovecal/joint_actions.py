@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from glovecal_client import Pose
 from glovecal_client.wire.pose import PoseFlag, RotationFlag
@@ -61,6 +61,10 @@ class HandMapping(Protocol):
         """Where the robot is before it follows, by the names of its actions."""
         ...
 
+    def know(self, meta: Mapping[str, Any]) -> None:
+        """What ``pose/meta`` says of the poses that come now. Raises GloveNotUsable."""
+        ...
+
     def values(self, degrees: Mapping[str, float]) -> dict[str, float]:
         """Its actions, within their limits, where the hand's rotations are these."""
         ...
@@ -84,6 +88,9 @@ class SummedRotations:
     @property
     def start(self) -> dict[str, float]:
         return {name: action.start for name, action in self.actions.items()}
+
+    def know(self, meta: Mapping[str, Any]) -> None:
+        """Nothing: rotations are summed whoever's they are."""
 
     def values(self, degrees: Mapping[str, float]) -> dict[str, float]:
         return {name: action.value(degrees) for name, action in self.actions.items()}

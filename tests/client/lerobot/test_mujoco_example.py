@@ -1,6 +1,6 @@
 """The example: hands in MuJoCo that follow a glove, recorded as a data set that pyarrow reads back."""
 
-# pyright: reportMissingImports=false
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
 
 from __future__ import annotations
 
@@ -9,19 +9,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import mujoco_hand
 import numpy as np
 import pytest
+from lerobot_teleoperator_glovecal.joint_actions import GloveNotUsable, JointAction
+from lerobot_teleoperator_glovecal.robot_joints import RobotJoints
 from loopback import free_endpoint
 from published_poses import NAMES, POSE, Glove
 from pyarrow import parquet
 
 from glovecal_client import open_router
 from glovecal_client.wire.pose import RotationFlag
+from glovecal_models.hand.retargeting.robot import RobotHand, urdf_of
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG, HAND_ROTATIONS
 from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.robot_hand import mjcf
+from lerobot_teleoperator_glovecal import GlovecalTeleoperator, GlovecalTeleoperatorConfig
 
 GRIPPER = """
 <mujoco>
@@ -111,6 +117,61 @@ def test_another_hand_is_mapped_and_a_faulty_sensor_ends_the_recording(
     np.testing.assert_allclose(rows["action"][-1], [0.6, 0.3], atol=2e-3)
     np.testing.assert_allclose(rows["observation.state"][-1], [0.6, 0.3], atol=0.02)
     assert len(rows["index"]) < 1800
+
+
+def test_a_robots_hand_does_what_the_persons_does(tmp_path: Path) -> None:
+    compiler = '<mujoco><compiler boundmass="0.01" boundinertia="1e-5" fusestatic="false"/></mujoco></robot>'
+    spec = mujoco.MjSpec.from_string(urdf_of("allegro_right").replace("</robot>", compiler))
+    for joint in spec.joints:
+        joint.armature = 1e-3
+    model, folder = tmp_path / "allegro.xml", tmp_path / "dataset"
+    spec.compile()
+    model.write_text(spec.to_xml(), encoding="utf-8")
+    fist = {name: 80.0 for name in HAND_ROTATIONS if name.partition("_")[2] in ("MCP", "PIP", "DIP")}
+    degrees = np.array([fist.get(name, 10.0) for name in HAND_ROTATIONS], np.float32)
+    many = np.zeros(len(degrees))
+    pose = replace(
+        POSE, degrees=degrees, deviations=(many + 1).astype(np.float32), rotation_flags=many.astype(np.uint8)
+    )
+    with published(pose=pose, names=HAND_ROTATIONS) as (_, endpoint):
+        words = [str(model), str(folder), "--robot", "allegro", "--connect", endpoint, "--seconds", "3"]
+        assert mujoco_hand.main([*words, "--allow-simulated"]) == 0
+    names = json.loads((folder / "meta/info.json").read_text(encoding="utf-8"))["features"]["action"]["names"]
+    rows, robot = rows_of(folder), RobotHand.known("allegro_right")
+    assert [name.removesuffix(".pos") for name in names] == list(robot.free)
+    assert (rows["action"] >= robot.limits[:, 0] - 1e-6).all()
+    assert (rows["action"] <= robot.limits[:, 1] + 1e-6).all()
+    last = dict(zip(robot.free, rows["action"][-1], strict=True))
+    for finger in ("ff", "mf", "rf"):
+        np.testing.assert_allclose(
+            np.degrees([last[f"{finger}j{number}"] for number in (1, 2, 3)]), 80.0, atol=8.0
+        )
+    np.testing.assert_allclose(rows["observation.state"][-1], rows["action"][-1], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"robot": "alegro"}, "did you mean 'allegro'"),
+        ({"robot": "leap", "side": "left"}, "leap_right"),
+        ({"robot": "shadow", "unit": "turns"}, "radians or degrees"),
+        ({"robot": "shadow", "actions": {"a": JointAction({"I_PIP": 1.0})}}, "give one of them"),
+        ({}, "name each action"),
+    ],
+)
+def test_robots_that_cannot_be_are_refused_before_anything_moves(asked: dict[str, Any], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        GlovecalTeleoperator(GlovecalTeleoperatorConfig(**asked))
+
+
+def test_the_other_hands_glove_moves_no_robot() -> None:
+    mapping = RobotJoints("shadow", "right", "degrees")
+    with pytest.raises(GloveNotUsable, match="on the left hand"):
+        mapping.know({"hand": "left", "rotations": list(HAND_ROTATIONS)})
+    mapping.know({"hand": "right", "rotations": ["I_PIP", "W_FLEX"], "skeleton": None})
+    assert mapping.rotations == {"I_PIP", "W_FLEX"}
+    bent = mapping.values({"I_PIP": 70.0, "W_FLEX": 0.0})
+    assert bent["rh_FFJ2.pos"] == pytest.approx(70.0, abs=1.0)
 
 
 def test_joints_that_are_not_there_and_folders_that_are_refused(

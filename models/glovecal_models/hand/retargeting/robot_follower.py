@@ -29,6 +29,14 @@ class RobotFollower:
         self._held = HeldAngles()
         self._before: np.ndarray | None = None
 
+    @property
+    def straight(self) -> dict[str, float]:
+        """Radians of the robot's joints where every rotation of the hand is at 0."""
+        flat = np.zeros((1, len(self._retargeting.skeleton.rotations)))
+        return dict(
+            zip(self._retargeting.robot.free, self._retargeting.radians(flat)[0].tolist(), strict=True)
+        )
+
     def radians(
         self, rotations: Sequence[str], degrees: np.ndarray, usable: np.ndarray
     ) -> dict[str, float] | None:
