@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.bones import HAND
 from glovecal_models.hand.retargeting.bone_names import bones_of
 from glovecal_models.hand.retargeting.retarget import Retargeting
 from glovecal_models.hand.retargeting.rig import Rig, hand_of
@@ -88,6 +89,11 @@ class MovingHand:
     def names(self) -> tuple[str, ...]:
         """Of the bones that turn."""
         return self.touches.retargeting.names
+
+    @property
+    def bone(self) -> str:
+        """That is the whole hand."""
+        return self.touches.retargeting.mapping[HAND]
 
     def turns(self) -> Iterator[tuple[slice, np.ndarray]]:
         """Frames of a block, and (n, M, 3, 3) of each of ``names`` against its parent."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,11 @@ import numpy as np
 from glovecal_service.exports.body_motion import BODY_AXES, SKELETAL, BodyMotion, Bone, heads_mm, with_ends
 from glovecal_service.exports.character import NAME
 from glovecal_service.exports.fbx_animation import (
-    CONSTANT,
     TURN,
     Animated,
     Animation,
+    channels_of,
     euler_curves,
-    ticks_of,
 )
 from glovecal_service.exports.fbx_records import CREATED, FILE_ID, VERSION, Records, Value
 from glovecal_service.exports.hand_motion import ALL_CHANNELS, Content, ExportFormat, HandMotion
@@ -46,23 +46,10 @@ def write_fbx(motions: Sequence[HandMotion], content: Content, path: Path) -> No
             Animated(ids[name], TURN, tuple("XYZ"), own)
             for name, own in zip(body.moving, curves, strict=True)
         ]
-        channels = {bone: list(_channels(ids[bone], motion)) for bone, motion in body.by_hand_bone.items()}
-        animated = [*turned, *(one for own in channels.values() for one in own)]
+        beside_angles = (channels_of(ids[bone], motion) for bone, motion in body.by_hand_bone.items())
+        animated = [*turned, *chain.from_iterable(beside_angles)]
         animation = Animation(ANIMATION, body.time_s - body.time_s[0], animated, body.notes)
-        _write(Records(stream), body, bones, ids, channels, animation)
-
-
-def _channels(hand: np.int64, motion: HandMotion) -> Iterator[Animated]:
-    """Standard deviations and flags as properties of the hand's bone."""
-    ticks = ticks_of(motion.time_s - motion.time_s[0])
-    for channel in motion.channels:
-        for rotation, values in zip(motion.rotations, channel.numbers.T.astype("<f4"), strict=True):
-            key = f"{channel.key}.{rotation}"
-            if channel.is_held:
-                changes = np.flatnonzero(np.diff(values, prepend=np.nan))
-                yield Animated(hand, key, (key,), values[None, changes], CONSTANT, ticks[changes])
-            else:
-                yield Animated(hand, key, (key,), values[None])
+        _write(Records(stream), body, bones, ids, animation)
 
 
 def _write(
@@ -70,7 +57,6 @@ def _write(
     body: BodyMotion,
     bones: Sequence[Bone],
     ids: Mapping[str, np.int64],
-    channels: Mapping[str, Sequence[Animated]],
     animation: Animation,
 ) -> None:
     time_s = body.time_s
@@ -78,7 +64,7 @@ def _write(
     _write_head(records, float(1 / np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0)
     _write_counts(records, len(bones), animation.counts)
     with records.record("Objects"):
-        _write_skeleton(records, body, bones, ids, channels)
+        _write_skeleton(records, body, bones, ids, animation)
         _write_pose(records, bones, ids)
         animation.write_objects(records)
     with records.record("Connections"):
@@ -134,7 +120,7 @@ def _write_skeleton(
     body: BodyMotion,
     bones: Sequence[Bone],
     ids: Mapping[str, np.int64],
-    channels: Mapping[str, Sequence[Animated]],
+    animation: Animation,
 ) -> None:
     for bone in bones:
         with records.object("NodeAttribute", ids[bone.name] + ATTRIBUTE, bone.name, "LimbNode"):
@@ -150,15 +136,8 @@ def _write_skeleton(
                 ("Lcl Rotation", "Lcl Rotation", "", "A", 0.0, 0.0, 0.0),
                 ("Lcl Scaling", "Lcl Scaling", "", "A", 1.0, 1.0, 1.0),
                 *notes,
-                *map(_user_property, channels.get(bone.name, ())),
+                *animation.declared(ids[bone.name]),
             )
-
-
-def _user_property(one: Animated) -> tuple[str | Value, ...]:
-    first = float(one.curves[0, 0])
-    if one.interpolation == CONSTANT:
-        return one.property, "int", "Integer", "A+U", int(first)
-    return one.property, "double", "Number", "A+U", first
 
 
 def _write_pose(records: Records, bones: Sequence[Bone], ids: Mapping[str, np.int64]) -> None:

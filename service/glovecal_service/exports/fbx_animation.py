@@ -14,7 +14,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from glovecal_service.exports.character import NAME
-from glovecal_service.exports.fbx_records import Compressed, Records
+from glovecal_service.exports.fbx_records import Compressed, Records, Value
+from glovecal_service.exports.hand_motion import HandMotion
 
 TICKS_PER_S = 46_186_158_000
 CONSTANT, LINEAR = 2, 4
@@ -59,6 +60,11 @@ class Animation:
     @cached_property
     def _ticks(self) -> np.ndarray:
         return ticks_of(self.time_s)
+
+    def declared(self, model: int | np.int64) -> list[tuple[str | Value, ...]]:
+        """Rows for the properties of a model that it has not of itself."""
+        own = (one for one in self.animated if one.model == model and one.property != TURN)
+        return [_user_property(one) for one in own]
 
     def write_objects(self, records: Records) -> None:
         with records.object("AnimationStack", self.first, NAME):
@@ -106,6 +112,26 @@ class Animation:
         for one in self.animated:
             yield one, id
             id += np.int64(1 + len(one.axes))
+
+
+def channels_of(hand: np.int64, motion: HandMotion) -> Iterator[Animated]:
+    """Standard deviations and flags as properties of the hand's bone."""
+    ticks = ticks_of(motion.time_s - motion.time_s[0])
+    for channel in motion.channels:
+        for rotation, values in zip(motion.rotations, channel.numbers.T.astype("<f4"), strict=True):
+            key = f"{channel.key}.{rotation}"
+            if channel.is_held:
+                changes = np.flatnonzero(np.diff(values, prepend=np.nan))
+                yield Animated(hand, key, (key,), values[None, changes], CONSTANT, ticks[changes])
+            else:
+                yield Animated(hand, key, (key,), values[None])
+
+
+def _user_property(one: Animated) -> tuple[str | Value, ...]:
+    first = float(one.curves[0, 0])
+    if one.interpolation == CONSTANT:
+        return one.property, "int", "Integer", "A+U", int(first)
+    return one.property, "double", "Number", "A+U", first
 
 
 def ticks_of(time_s: np.ndarray) -> np.ndarray:

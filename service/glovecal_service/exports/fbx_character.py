@@ -33,6 +33,7 @@ from glovecal_service.exports.fbx_animation import (
     TURN,
     Animated,
     Animation,
+    channels_of,
     euler_curves,
     euler_degrees,
 )
@@ -43,6 +44,7 @@ from glovecal_service.exports.fbx_records import (
     Record,
     RecordFile,
     Records,
+    Value,
 )
 from glovecal_service.exports.hand_motion import HandMotion
 
@@ -159,6 +161,8 @@ class FbxCharacter(Character):
                 for model, own in zip(turning, curves, strict=True)
             ]
             animated += self._still(set(hand_names), by_name)
+            for hand, motion in zip(hands, motions, strict=True):
+                animated += channels_of(np.int64(by_name[hand.bone].id), motion)
             animation = Animation(np.int64(self.first_free), time_s, animated, notes_of(motions))
             _write(file, Records(stream, file.version), animation)
 
@@ -191,6 +195,15 @@ def _opened(path: Path, name: str) -> Iterator[RecordFile]:
 
 def _write(file: RecordFile, records: Records, animation: Animation) -> None:
     records.begin_file()
+
+    def declare(one: Record) -> bool:
+        if one.name != b"Model":
+            return False
+        rows = animation.declared(_integer(next(file.values(one))))
+        if rows:
+            _copy_declaring(file, one, records, rows)
+        return bool(rows)
+
     more = {
         b"Objects": animation.write_objects,
         b"Connections": animation.write_connections,
@@ -200,11 +213,30 @@ def _write(file: RecordFile, records: Records, animation: Animation) -> None:
         if record.name == b"Definitions":
             _write_definitions(file, record, records, animation.counts)
         elif record.name in more:
-            with file.copied(record, records):
+            with file.copied(record, records, declare):
                 more[record.name](records)
         else:
             file.copy(record, records)
     records.end_file(file.footer_id)
+
+
+def _copy_declaring(
+    file: RecordFile, model: Record, records: Records, rows: Sequence[tuple[str | Value, ...]]
+) -> None:
+    """A model with properties more."""
+
+    def add(part: Record) -> bool:
+        if part.name != b"Properties70":
+            return False
+        names = {_text(next(file.values(row), b"")) for row in file.records(part)}
+        with file.copied(part, records):
+            for row in rows:
+                if row[0] not in names:
+                    records.leaf("P", *row)
+        return True
+
+    with file.copied(model, records, add):
+        pass
 
 
 def _write_definitions(

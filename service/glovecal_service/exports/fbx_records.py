@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from mmap import mmap
@@ -226,11 +226,15 @@ class RecordFile:
                 raise self._damaged(at, f"it has a value of the unknown kind {kind!r}")
 
     @contextmanager
-    def copied(self, record: Record, records: Records) -> Iterator[None]:
-        """A record with all that it holds; more can be written into it."""
+    def copied(
+        self, record: Record, records: Records, instead: Callable[[Record], bool] = lambda _: False
+    ) -> Iterator[None]:
+        """A record with all that it holds; more can be written into it. ``instead``: writes another for
+        one of its records, and says whether it did."""
         with self._copied_values(record, records):
             for one in self.records(record):
-                self.copy(one, records)
+                if not instead(one):
+                    self.copy(one, records)
             yield
             records.stream.write(records.form.no_record)
 

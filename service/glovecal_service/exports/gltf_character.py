@@ -16,7 +16,7 @@ import numpy as np
 from glovecal_models.documents import read_json
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.retargeting.rig import Rig, RigBone
-from glovecal_service.exports.body_motion import continuous_quaternions
+from glovecal_service.exports.body_motion import SIDES, continuous_quaternions
 from glovecal_service.exports.character import (
     DEEPEST,
     MOST_LISTED,
@@ -33,6 +33,7 @@ from glovecal_service.exports.gltf import (
     JSON_CHUNK,
     MAGIC,
     BinaryNumbers,
+    channels_of,
     write_container,
 )
 from glovecal_service.exports.hand_motion import HandMotion
@@ -120,9 +121,10 @@ class GltfCharacter(Character):
                 channels.append({"sampler": len(samplers), "target": target})
                 samplers.append({"input": times, "output": room, "interpolation": "LINEAR"})
             planned.append((hand, rooms))
-        animation = {
-            "name": NAME, "channels": channels, "samplers": samplers, "extras": notes_of(motions),
-        }  # fmt: skip
+        extras = notes_of(motions) | {
+            "glovecal": {SIDES[motion.label].lower(): channels_of(motion, numbers) for motion in motions}
+        }
+        animation = {"name": NAME, "channels": channels, "samplers": samplers, "extras": extras}
         document.setdefault("animations", []).append(animation)
         buffers = document.setdefault("buffers", [{}])
         buffers[0]["byteLength"] = numbers.length

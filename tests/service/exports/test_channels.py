@@ -21,8 +21,10 @@ from rosbags.typesys import Stores, get_typestore
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from characters import write_character, write_fbx_character
 from posed_hands import RATE_HZ, moving
 
+from glovecal_service.exports.character_files import read_character
 from glovecal_service.exports.formats import FORMATS
 from glovecal_service.exports.hand_motion import NOT_KNOWN, HandMotion
 
@@ -45,9 +47,12 @@ def doubtful() -> HandMotion:
 UFBX = """
 import json, os, sys, ufbx
 scene, rotations, rows = ufbx.load_file(sys.argv[1]), sys.argv[3].split(), []
+stacks = scene.anim_stacks
+stack = stacks[len(stacks) - 1]
+anim = stack.anim
 for frame in range(int(sys.argv[2])):
-    still = ufbx.evaluate_scene(scene, scene.anim, (frame + 0.001) / 60)
-    hand = still.find_node("RightHand")
+    still = ufbx.evaluate_scene(scene, anim, (frame + 0.001) / 60)
+    hand = still.find_node(sys.argv[4])
     own = hand.props
     rows.append([[own.find_real(f"{key}.{name}", -9.0) for name in rotations] for key in ("sd_deg", "flags")])
 print(json.dumps(rows), flush=True)
@@ -55,9 +60,9 @@ os._exit(0)  # this version of the reader crashes where it ends
 """
 
 
-def read_fbx(path: Path, motion: HandMotion) -> Read:
+def read_fbx(path: Path, motion: HandMotion, bone: str = "RightHand") -> Read:
     pytest.importorskip("ufbx", reason="ufbx, an independent reader of FBX, has no package for this computer")
-    asked = [str(path), str(len(motion.time_s)), " ".join(motion.rotations)]
+    asked = [str(path), str(len(motion.time_s)), " ".join(motion.rotations), bone]
     done = subprocess.run(
         [sys.executable, "-I", "-c", UFBX, *asked], capture_output=True, text=True, check=True
     )
@@ -141,3 +146,13 @@ def test_a_motion_that_was_measured_has_no_flags(tmp_path: Path) -> None:
         content = (tmp_path / f"one{suffix}").read_bytes()
         assert b"sd_deg" in content
         assert b"flags" not in content
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx"])
+def test_they_travel_on_a_character_too(tmp_path: Path, suffix: str) -> None:
+    motion, path, moved = doubtful(), tmp_path / f"character{suffix}", tmp_path / f"moved{suffix}"
+    write = write_character if suffix == ".glb" else write_fbx_character
+    write(path, "mixamo")
+    read_character(path, path.name).write([motion], "joints", moved, {})
+    read = read_glb(moved, motion) if suffix == ".glb" else read_fbx(moved, motion, "mixamorig:RightHand")
+    np.testing.assert_array_equal(read["flags"], motion.flags)

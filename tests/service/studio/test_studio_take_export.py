@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "exports"))
 
-from characters import write_character
+from characters import write_character, write_fbx_character
 from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
@@ -81,6 +81,22 @@ def test_a_character_moves_and_the_page_shows_which_bone_is_which(
     moved = {document.nodes[channel.target.node].name for channel in document.animations[0].channels}
     assert "mixamorig:RightHandIndex1" in moved
     assert not any("Left" in name for name in moved)
+    page.get_by_role("combobox", name="Format").click()
+    page.get_by_role("option", name="FBX 7.4, binary (.fbx)").click()
+    expect(page.get_by_role("button", name="Choose a character (.glb)")).to_be_hidden()
+    expect(bones).to_have_count(0)
+    write_fbx_character(tmp_path / "hero.fbx", "mixamo")
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Choose a character (.fbx)").click()
+    chooser.value.set_files(tmp_path / "hero.fbx")
+    expect(bones.get_by_label("index proximal, right")).to_have_value(
+        "mixamorig:RightHandIndex1", timeout=PATIENCE_MS
+    )
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Export the motion").click()
+    saved.value.save_as(tmp_path / "moved.fbx")
+    assert b"mixamorig:RightHandIndex1" in (tmp_path / "moved.fbx").read_bytes()
+    assert b"Glovecal take" in (tmp_path / "moved.fbx").read_bytes()
     assert seen.complaints == []
 
 
