@@ -8,7 +8,10 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("models/glovecal_models", "models/glovecal", "client/glovecal_client", "service/glovecal_service")
+PACKAGES = (
+    "models/glovecal_models", "models/glovecal", "client/glovecal_client", "service/glovecal_service",
+    "client/blender/glovecal_blender", "client/lerobot_teleoperator_glovecal/lerobot_teleoperator_glovecal",
+)  # fmt: skip
 MODELS = "glovecal_models"
 PLUG_INS = ("glovecal_models.effects.", "glovecal_models.simulation.causes.")
 MACHINERY = "glovecal_models.effects.base."
