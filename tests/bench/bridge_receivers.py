@@ -9,11 +9,12 @@ and at the end of standard input what it has counted, as JSON.
 from __future__ import annotations
 
 import json
+import math
 import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ import numpy as np
 from glovecal_client.clock import clock_ns, wall_ns
 
 Arrival = tuple[str, float | None]
-"""Glove, and seconds since the hand was so where the format tells it."""
+"""Glove, and seconds since the hand was so."""
+PERIOD_S = 64.0
 
 
 def websocket(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
@@ -87,29 +89,51 @@ def ros2(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
 
 
 def vmc(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
-    return _datagrams(host, port, {b"RightIndexProximal": gloves[0], b"LeftIndexProximal": gloves[1]})
+    yield "", None
+    bones = {b"RightIndexDistal": gloves[0], b"LeftIndexDistal": gloves[1]}
+    for datagram in _datagrams(host, port):
+        for bone, glove in bones.items():
+            if (at := datagram.find(bone + b"\0")) >= 0:
+                floats = at + len(bone) + 4 - len(bone) % 4
+                yield glove, _since(struct.unpack_from(">7f", datagram, floats)[3:])
 
 
 def unreal(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
-    return _datagrams(host, port, {f"glovecal_{glove}".encode(): glove for glove in gloves})
+    yield "", None
+    subjects = {f"glovecal_{glove}": glove for glove in gloves}
+    for datagram in _datagrams(host, port):
+        for subject, rows in json.loads(datagram).items():
+            (turn,) = (row["Rotation"] for row in rows if row["Name"].startswith("index_03"))
+            yield subjects[subject], _since(turn)
 
 
 def rokoko(host: str, port: int, gloves: tuple[str, ...]) -> Iterator[Arrival]:
-    return _datagrams(host, port, {f'"glove":"{glove}"'.encode(): glove for glove in gloves})
+    yield "", None
+    for datagram in _datagrams(host, port):
+        scene = json.loads(datagram)["scene"]
+        yield scene["actors"][0]["glovecal"]["glove"], clock_ns() / 1e9 - scene["timestamp"]
 
 
-def _datagrams(host: str, port: int, glove_of: dict[bytes, str]) -> Iterator[Arrival]:
-    """By what stands in the datagrams of each glove."""
+def _datagrams(host: str, port: int) -> Iterator[bytes]:
     import socket
 
-    yield "", None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind((host, port))
         while True:
-            datagram = opened.recv(65536)
-            for mark, glove in glove_of.items():
-                if mark in datagram:
-                    yield glove, None
+            yield opened.recv(65536)
+
+
+def moment(time_ns: int) -> float:
+    """Degrees that the last joint of the index finger is bent at that time: a degree a second, then anew, so
+    that bones tell the time where a format has none."""
+    return time_ns / 1e9 % PERIOD_S
+
+
+def _since(xyzw: Sequence[float]) -> float:
+    """Seconds since the hand was so."""
+    x, y, z, w = xyzw
+    degrees = 2 * math.degrees(math.atan2(math.hypot(x, y, z), abs(w)))
+    return (moment(clock_ns()) - degrees + PERIOD_S / 2) % PERIOD_S - PERIOD_S / 2
 
 
 KINDS: dict[str, Callable[[str, int, tuple[str, ...]], Iterator[Arrival]]] = {

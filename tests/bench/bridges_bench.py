@@ -4,8 +4,8 @@
 
 Real zenoh; gloves, bridge (``glovecal bridge``) and receivers are processes. The added delay is the bridge's
 own figure, from a pose's arrival in its process to its departure; the delay from the hand is measured by the
-receiver where the format tells the hand's time. Then one receiver after another is killed and started again
-beside one that stays.
+receiver, by the time in the format, or where there is none by a finger that bends as the clock goes. Then one
+receiver after another is killed and started again beside one that stays.
 """
 
 from __future__ import annotations
@@ -27,9 +27,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from bridge_receivers import moment
 from bridge_support import FIST, WornHand
 from realtime_support import free_endpoint
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.session import open_client, open_router
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 
@@ -160,7 +162,8 @@ def _publish(endpoint: str, names: tuple[str, str], ready: Any, ended: Any) -> N
         began, count = time.monotonic(), 0
         while not ended.is_set():
             for hand in hands:
-                hand.put(FIST)
+                now_ns = clock_ns()
+                hand.put({**FIST, "I_DIP": moment(now_ns)}, time_ns=now_ns)
             count += 1
             time.sleep(max(0.0, began + count / RATE_HZ - time.monotonic()))
 
