@@ -30,6 +30,8 @@ DEEPEST = 500
 LONGEST_NAME = 200
 LARGEST = 1e12
 """Of a matrix: what is larger is no place of a bone."""
+FLATTEST = 1e-6
+"""Of a matrix whose columns have the length one: the least singular value, below which it has no turn."""
 NAME = "Glovecal take"
 """Of the animation."""
 
@@ -124,12 +126,12 @@ def distinct(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def axes_of(matrix: np.ndarray) -> np.ndarray:
-    """(3, 3) the orientation in a matrix (4, 4) of place, turn and size. Raises ValueError where there is
-    none."""
+    """(3, 3) the orientation in a matrix (4, 4) of place, turn and size, of a sheared one the nearest. Raises
+    ValueError where there is none."""
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.abs(matrix) < LARGEST).all() or not sizes.all():
         raise ValueError("no place, or no size")
-    axes = matrix[:3, :3] / sizes
-    if abs(np.linalg.det(axes)) < 0.5:
+    left, strengths, right = np.linalg.svd(matrix[:3, :3] / sizes)
+    if strengths[-1] < FLATTEST:
         raise ValueError("no turn")
-    return axes
+    return left @ right

@@ -130,6 +130,8 @@ class FbxCharacter(Character):
             if depth > DEEPEST:
                 raise ValueError("no tree")
             placed = self._placed(model, parent, above)
+            if not placed.size.all():  # it shows nothing, nor what hangs on it
+                continue
             x, y, z = placed.world[:3, 3].tolist()
             above_name = None if parent is None else parent.name
             yield RigBone(model.name, above_name, (x, y, z), axes_of(placed.world))

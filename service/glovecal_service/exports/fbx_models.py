@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from glovecal_service.exports.character import axes_of
+from glovecal_service.exports.character import LARGEST, axes_of
 from glovecal_service.exports.fbx_animation import TURN
 
 ORDERS = ("xyz", "xzy", "yzx", "yxz", "zxy", "zyx")
@@ -99,7 +99,7 @@ class Placed:
         return cls(np.eye(4), np.eye(4), np.ones(3), np.ones(3))
 
     def below(self, model: Model) -> Placed:
-        """One that hangs on this. Raises ValueError where it has no place."""
+        """One that hangs on this. Raises ValueError for a place that cannot be."""
         if model.inherits not in (BY_AXIS, NOT_ITS_PARENTS):
             unsized = self.world @ _matrix(model.turn, model.shift)
             size, taken_on = model.size, np.ones(3)
@@ -107,11 +107,16 @@ class Placed:
             unsized = self.unsized @ _matrix(model.turn, model.shift * self.size)
             taken_on = self.size if model.inherits == BY_AXIS else self.taken_on
             size = model.size * taken_on
-        return Placed(_bounded(unsized @ _matrix(np.diag(size), np.zeros(3))), unsized, size, taken_on)
+        world = unsized @ _matrix(np.diag(size), np.zeros(3))
+        if not (np.abs(world) < LARGEST).all():
+            raise ValueError("no place")
+        return Placed(world, unsized, size, taken_on)
 
     def at(self, against: np.ndarray) -> Placed:
-        """One whose matrix (4, 4) against this is known."""
-        world = _bounded(self.world @ _bounded(against))
+        """One whose matrix (4, 4) against this is known. Raises ValueError for one without a turn or size."""
+        axes_of(against)
+        world = self.world @ against
+        axes_of(world)
         size = np.linalg.norm(world[:3, :3], axis=0)
         return Placed(world, world @ _matrix(np.diag(1 / size), np.zeros(3)), size, np.ones(3))
 
@@ -119,9 +124,4 @@ class Placed:
 def _matrix(linear: np.ndarray, shift: np.ndarray) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = linear, shift
-    return matrix
-
-
-def _bounded(matrix: np.ndarray) -> np.ndarray:
-    axes_of(matrix)
     return matrix

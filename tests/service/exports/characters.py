@@ -75,7 +75,7 @@ def both_hands(convention: str, unit_mm: float) -> Rig:
 
 def write_fbx_character(
     path: Path, convention: str, *, version: int = 7400, metres: bool = False, has_bind_pose: bool = True,
-    is_posed: bool = False, z_up: bool = True,
+    is_posed: bool = False, z_up: bool = True, mesh: np.ndarray = MESH,
 ) -> Rig:  # fmt: skip
     """The rig that it has, in the file's world. Each bone has turns before and after, an order of angles and
     pivots of its own; ``is_posed``: fingers of the file are not as in its bind pose."""
@@ -108,7 +108,7 @@ def write_fbx_character(
                     records.properties(("RotationActive", "bool", "", "", 1))
         with records.record("Objects"):
             with records.object("Geometry", np.int64(90), "body", "Mesh"):
-                records.leaf("Vertices", MESH)
+                records.leaf("Vertices", mesh)
             for bone in bones:
                 with records.object("Model", ids[bone.name], bone.name, "LimbNode"):
                     bent = is_posed and any(word in bone.name.lower() for word in ("index", "metacarpal"))

@@ -6,6 +6,7 @@ import io
 import json
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,18 @@ def test_an_array_that_would_swell_is_refused(tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(BadInput, match="1073741824 numbers where at most 4096 are expected"):
         read_character(path, "bomb.fbx")
+
+
+def test_what_a_large_file_takes_is_bounded(tmp_path: Path) -> None:
+    path = tmp_path / "large.fbx"
+    write_fbx_character(path, "mixamo", mesh=np.zeros(2_000_000))
+    tracemalloc.start()
+    character = read_character(path, "large.fbx")
+    character.write([moving("R", count=2)], "joints", tmp_path / "moved.fbx", {})
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 3 * path.stat().st_size
+    assert (tmp_path / "moved.fbx").stat().st_size > path.stat().st_size
 
 
 @pytest.fixture(scope="module")
