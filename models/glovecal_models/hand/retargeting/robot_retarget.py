@@ -26,7 +26,7 @@ MOST_STEPS, MOST_STEPS_FROM_BEFORE = 40, 4
 """Of Levenberg and Marquardt: from the middle of the limits, and from what the frame before ended in."""
 SETTLED = 1e-3
 """Radians of every joint in a step: then no more are taken."""
-DAMPING = 0.02
+JOINT_DAMPING = 0.02
 """Of a step, and of how far a joint that nothing tells is from the middle of its limits; a radian of a joint
 against a radian of a bone."""
 TOUCH_WEIGHT = 6.0
@@ -254,13 +254,13 @@ class RobotRetargeting:
 
     def _stepped(self, radians: np.ndarray, jacobian: np.ndarray, lack: np.ndarray) -> np.ndarray:
         low, high = self.robot.limits.T
-        pull = DAMPING**2 * (radians - (low + high) / 2)
+        pull = JOINT_DAMPING**2 * (radians - (low + high) / 2)
         gradient = (jacobian.swapaxes(1, 2) @ lack)[..., 0] + pull
         stuck = ((radians <= low) & (gradient > 0)) | ((radians >= high) & (gradient < 0))
         jacobian = np.where(stuck[:, None], 0.0, jacobian)
-        square = jacobian.swapaxes(1, 2) @ jacobian + 2 * DAMPING**2 * np.eye(len(low))
+        square = jacobian.swapaxes(1, 2) @ jacobian + 2 * JOINT_DAMPING**2 * np.eye(len(low))
         step = np.linalg.solve(square, np.where(stuck, 0.0, -gradient)[..., None])[..., 0]
-        return np.clip(radians + np.clip(step, -LONGEST_STEP, LONGEST_STEP), low, high)
+        return np.clip(radians + np.clip(step, -LARGEST_TURN, LARGEST_TURN), low, high)
 
     @cached_property
     def _bone_weights(self) -> np.ndarray:
@@ -272,5 +272,5 @@ class RobotRetargeting:
         return float(np.linalg.norm(self._bones.tails_mm[self._segments], axis=1).sum() / len(self.fingers))
 
 
-LONGEST_STEP = 0.5
+LARGEST_TURN = 0.5
 """Radians of a joint in one step: bones that point the other way would throw it from limit to limit."""
