@@ -56,9 +56,16 @@ class SoundForm:
 class LtcLine:
     """``take`` on one thread; ``time_code`` and ``look`` on any other."""
 
-    def __init__(self, form: SoundForm, rate: str | None, *, tell: Callable[[str], None]) -> None:
-        """``rate``: a name in ``RATES``, None to measure it."""
-        self._form, self._rate, self._tell = form, rate, tell
+    def __init__(
+        self,
+        form: SoundForm,
+        rate: str | None,
+        *,
+        tell: Callable[[str], None],
+        now_s: Callable[[], float] = clock_s,
+    ) -> None:
+        """``rate``: a name in ``RATES``, None to measure it; ``now_s``: this computer's monotonic clock."""
+        self._form, self._rate, self._tell, self._now_s = form, rate, tell, now_s
         self._rest = b""
         self._sound = np.zeros((0, form.channels), np.int16)
         self._clock = DeviceClock(form.samples_per_s, wrap=math.inf)
@@ -73,7 +80,7 @@ class LtcLine:
     def time_code(self) -> TimeCode | None:
         """By this computer's monotonic clock; None while none is on the line."""
         known = self._known
-        return None if known is None or clock_s() - known[1] > LOST_AFTER_S else known[0]
+        return None if known is None or self._now_s() - known[1] > LOST_AFTER_S else known[0]
 
     def look(self) -> None:
         """Tell once that the time code is there, or no longer."""
@@ -81,7 +88,9 @@ class LtcLine:
         if (code is not None) == self._was_there:
             return
         if code is not None:
-            self._tell(f"Time code on the line: {code.at(clock_s())}, {code.counting.named} frames a second.")
+            self._tell(
+                f"Time code on the line: {code.at(self._now_s())}, {code.counting.named} frames a second."
+            )
         elif known is None:
             if self._was_there is None:
                 return

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from ltc_sound import endless_ltc, pcm
 
-from glovecal_client.clock import clock_s
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.time_code import Counting
 from glovecal_service.ltc_line import ListeningLine, LtcLine, SoundForm, read_form
@@ -50,13 +49,17 @@ def expected(now_s: float, begin_s: float, first: int = TEN) -> str:
     return Counting("25").label(first + int((now_s - begin_s) * 25))
 
 
+NOW_S = 5000.0
+"""Of the clock, at the end of each test."""
+
+
 def new_line(told: Told, form: SoundForm | None = None) -> LtcLine:
-    return LtcLine(form or SoundForm(SAMPLES_PER_S), None, tell=told)
+    return LtcLine(form or SoundForm(SAMPLES_PER_S), None, tell=told, now_s=lambda: NOW_S)
 
 
 def test_it_tells_what_runs_now_however_late_blocks_come() -> None:
     told, rng = Told(), np.random.default_rng(1)
-    line, begin_s = new_line(told), clock_s() - 4.0
+    line, begin_s = new_line(told), NOW_S - 4.0
     assert line.time_code is None
     late_s = rng.exponential(0.02, 64)
     late_s[::7] = 0.0
@@ -75,14 +78,14 @@ def test_it_tells_what_runs_now_however_late_blocks_come() -> None:
 def test_the_channel_with_time_code_is_found_in_24_bits() -> None:
     told, sound = Told(), seconds(2)
     speech = 0.3 * np.sin(np.arange(len(sound)) / 40)
-    line, begin_s = new_line(told, SoundForm(SAMPLES_PER_S, 2, 3)), clock_s() - 2.0
+    line, begin_s = new_line(told, SoundForm(SAMPLES_PER_S, 2, 3)), NOW_S - 2.0
     feed(line, np.stack([speech, 0.2 * sound], axis=1), begin_s, width=3)
     assert line.time_code is not None
     assert line.time_code.at(begin_s + 0.005) == "10:00:00:00"
 
 
 def test_a_signal_that_is_lost_is_told_and_so_is_its_return() -> None:
-    told, begin_s = Told(), clock_s() - 6.0
+    told, begin_s = Told(), NOW_S - 6.0
     line = new_line(told)
     line.look()
     assert told == [], "nothing was ever there: takes say so"
@@ -97,7 +100,7 @@ def test_a_signal_that_is_lost_is_told_and_so_is_its_return() -> None:
 
 
 def test_a_jump_is_told_and_the_new_labels_hold() -> None:
-    told, begin_s = Told(), clock_s() - 4.0
+    told, begin_s = Told(), NOW_S - 4.0
     line = new_line(told)
     feed(line, np.concatenate([seconds(2), seconds(2, 2 * TEN)]), begin_s)
     assert told == ["The time code on the line jumped from 10:00:02:00 to 20:00:00:00."]
@@ -106,7 +109,7 @@ def test_a_jump_is_told_and_the_new_labels_hold() -> None:
 
 
 def test_lost_sound_is_told_and_times_are_right_again() -> None:
-    told, begin_s = Told(), clock_s() - 9.0
+    told, begin_s = Told(), NOW_S - 9.0
     line, sound = new_line(told), seconds(9)
     feed(line, sound[: 3 * SAMPLES_PER_S], begin_s)
     feed(line, sound[round(3.4 * SAMPLES_PER_S) :], begin_s + 3.4)
@@ -117,7 +120,7 @@ def test_lost_sound_is_told_and_times_are_right_again() -> None:
 
 
 def test_it_keeps_no_more_after_a_minute() -> None:
-    line, begin_s = new_line(Told()), clock_s() - 60.0
+    line, begin_s = new_line(Told()), NOW_S - 60.0
     second = [pcm(part[:, None]) for part in islice(endless_ltc(TEN, SAMPLES_PER_S), 60)]
 
     def feed_seconds(low: int, high: int) -> int:
@@ -138,7 +141,7 @@ def test_noise_has_no_time_code() -> None:
     told = Told()
     line = new_line(told)
     noise = 0.3 * np.random.default_rng(0).standard_normal(2 * SAMPLES_PER_S)
-    feed(line, noise, clock_s() - 2.0)
+    feed(line, noise, NOW_S - 2.0)
     line.look()
     assert (line.time_code, told) == (None, [])
 

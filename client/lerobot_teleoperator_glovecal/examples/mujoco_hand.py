@@ -118,6 +118,9 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--connect", default="tcp/127.0.0.1:7447", help="the service's zenoh endpoint")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--fps", type=int, default=30)
+    parser.add_argument(
+        "--hold", type=float, default=0.2, help="seconds without a pose to trust until it ends"
+    )
     parser.add_argument("--task", default="move the hand")
     parser.add_argument("--allow-simulated", action="store_true", help="follow a simulated glove")
     options = parser.parse_args(words)
@@ -129,7 +132,7 @@ def main(words: list[str] | None = None) -> int:
         mapped = {name: JointAction(**action) for name, action in written.items()}
     config = GlovecalTeleoperatorConfig(
         glove=options.glove, actions=mapped or {}, robot=options.robot, side=options.side,
-        connect=options.connect, allow_simulated=options.allow_simulated,
+        connect=options.connect, allow_simulated=options.allow_simulated, hold_s=options.hold,
     )  # fmt: skip
     if options.robot:
         teleoperator = GlovecalTeleoperator(config)
