@@ -62,8 +62,10 @@ class RestClient:
         *,
         transport: httpx.BaseTransport | None = None,
         patience_s: float = 300.0,
+        key: str | None = None,
     ) -> None:
-        """``transport`` replaces the network; ``patience_s`` bounds the wait for one answer."""
+        """``transport`` replaces the network; ``patience_s`` bounds the wait for one answer; ``key``: with
+        which a service that asks is told who this is."""
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
@@ -76,6 +78,7 @@ class RestClient:
             transport=transport,
             timeout=httpx.Timeout(patience_s, connect=5.0),
             trust_env=False,
+            headers={} if key is None else {"Authorization": f"Bearer {key}"},
         )
 
     def __enter__(self) -> RestClient:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -31,6 +31,8 @@ class Settings(BaseSettings):
     """Second part of every zenoh key."""
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8600
+    login: Literal["beyond loopback", "always"] = "beyond loopback"
+    """Who has to prove who they are: whoever asks a service that listens beyond loopback, or everybody."""
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     """Training processes, one thread each."""
     workers_idle_s: Annotated[float, Field(gt=0, le=86400)] = 60.0

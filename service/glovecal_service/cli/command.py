@@ -21,6 +21,7 @@ import typer.main
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
 from glovecal_client.program import handle_signals, run_command
 from glovecal_service.cli import completion, demo, overview, serve
+from glovecal_service.cli.access import audit, keys
 from glovecal_service.cli.asking import verb, verb_at_once
 from glovecal_service.cli.camera import cameras
 from glovecal_service.cli.effect import catalogue, changes, improvement
@@ -100,6 +101,8 @@ app.command("effects", rich_help_panel=EXPLAIN)(catalogue.effects)
 app.add_typer(models.app, name="model", rich_help_panel=KEEP)
 app.add_typer(subjects.app, name="subject", rich_help_panel=KEEP)
 app.add_typer(jobs.app, name="job", rich_help_panel=KEEP)
+app.add_typer(keys.app, name="key", rich_help_panel=KEEP)
+app.add_typer(audit.app, name="audit", rich_help_panel=KEEP)
 
 
 def _print_version(wanted: bool) -> None:

@@ -17,6 +17,7 @@ from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.rest import asking
+from glovecal_service.rest.access import audit, keys, login
 from glovecal_service.rest.effect import (
     catalogue,
     picture,
@@ -34,6 +35,7 @@ from glovecal_service.rest.glove import (
     recordings,
 )
 from glovecal_service.rest.http import health
+from glovecal_service.rest.http.access import AccessGuard
 from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
@@ -114,6 +116,7 @@ ROUTERS = (
         trial,
     ),
     *(jobs, overview, health),
+    *(keys, audit),
 )
 
 
@@ -128,8 +131,8 @@ def create_app(
 
     ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told.
 
-    No logins: whoever reaches the port may do everything, so it is bound to loopback by default, and
-    ``RequestGuard`` keeps pages of other sites out.
+    On loopback whoever reaches the port may do everything, and ``RequestGuard`` keeps pages of other sites
+    out; beyond it ``AccessGuard`` asks who it is.
     """
     metrics = Metrics()
 
@@ -173,7 +176,7 @@ def create_app(
 
 
 def _routers() -> list[tuple[str, APIRouter]]:
-    return [("", health.pages), *((PREFIX, noun.router) for noun in ROUTERS)]
+    return [("", health.pages), ("", login.router), *((PREFIX, noun.router) for noun in ROUTERS)]
 
 
 @cache
@@ -202,6 +205,8 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
         return settings.upload_limit_bytes if _takes_files(path) else JSON_LIMIT_BYTES
 
     app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)
+    is_asked = settings.login == "always" or not is_loopback(settings.host)
+    app.add_middleware(AccessGuard, is_asked=is_asked)
     app.add_middleware(RequestGuard, loopback_only=is_loopback(settings.host))
     app.add_middleware(Observation, metrics=metrics)
 

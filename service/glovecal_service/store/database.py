@@ -36,7 +36,9 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
 from glovecal_service.store import tables
+from glovecal_service.store.audit_trail import watch_changes, written_down
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
+from glovecal_service.store.scope import narrow_statements
 from glovecal_service.store.texts import json_text
 
 
@@ -76,6 +78,8 @@ class Database:
         """Raises BadInput if the URL is not one of SQLite or PostgreSQL (through psycopg 3)."""
         self.engine = _engine(url)
         self.is_sqlite = self.engine.dialect.name == "sqlite"
+        narrow_statements(self.engine)
+        watch_changes(self.engine)
         self._writing = self.engine.execution_options(glovecal_begin="BEGIN IMMEDIATE")
 
     @property
@@ -99,7 +103,7 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[Connection]:
         """A transaction that is kept whole or not at all."""
-        with self._translated(), self._writing.begin() as connection:
+        with self._translated(), self._writing.begin() as connection, written_down(connection):
             yield connection
 
     def close(self) -> None:

@@ -10,11 +10,13 @@ from types import TracebackType
 
 from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
+from glovecal_service.store.audit import Audit
 from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
 from glovecal_service.store.data_folder_lock import LOCK, WHO
 from glovecal_service.store.database import Database, Revision
 from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.jobs import Jobs
+from glovecal_service.store.keys import Keys
 from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
 from glovecal_service.store.recordings import Recordings
@@ -38,6 +40,8 @@ class Store:
         self.recordings = Recordings(database)
         self.samplings = Samplings(database)
         self.jobs = Jobs(database, clock)
+        self.keys = Keys(database)
+        self.audit = Audit(database)
         self.revision = Revision(database)
 
     @classmethod

@@ -317,3 +317,45 @@ revision = Table(
     Column("id", Integer, primary_key=True, autoincrement=False),
     Column("value", BigInteger, nullable=False),
 )
+
+keys = Table(
+    "keys",
+    metadata,
+    Column("name", NAME, primary_key=True),
+    Column("sha256", SHA256, nullable=False),
+    Column("role", String(16), nullable=False),
+    Column("subjects", Json),
+    Column("created_at", UtcTime, nullable=False),
+    Column("revoked_at", UtcTime),
+    Column("row_sha256", SHA256, nullable=False),
+    UniqueConstraint("sha256"),
+)
+
+sessions = Table(
+    "sessions",
+    metadata,
+    Column("sha256", SHA256, primary_key=True),
+    Column("key", NAME, ForeignKey("keys.name"), nullable=False),
+    Column("expires_at", UtcTime, nullable=False),
+)
+
+audit = Table(
+    "audit",
+    metadata,
+    Column("id", GROWING, primary_key=True, autoincrement=False),
+    Column("at", UtcTime, nullable=False),
+    Column("who", Text, nullable=False),
+    Column("origin", Text, nullable=False),
+    Column("action", Text, nullable=False),
+    Column("changes", Json, nullable=False),
+    Column("previous", SHA256, nullable=False),
+    Column("sha256", SHA256, nullable=False),
+)
+
+audit_head = Table(
+    "audit_head",
+    metadata,
+    Column("id", Integer, primary_key=True, autoincrement=False),
+    Column("count", GROWING, nullable=False),
+    Column("sha256", SHA256, nullable=False),
+)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import httpx
 from fastapi import FastAPI
-from nicegui import ui
+from nicegui import context, ui
 
 from glovecal_service.plain import TOTAL, read
 from glovecal_service.rest.http.observation import STUDIO
@@ -40,6 +40,13 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
         yield
     except Refusal as refusal:
         tell(str(refusal))
+
+
+def _session() -> dict[str, str]:
+    """The cookie with which the page was opened: what it asks is asked by who opened it."""
+    request = context.client.request if context.slot_stack else None
+    cookie = "" if request is None else request.headers.get("cookie", "")
+    return {"Cookie": cookie} if cookie else {}
 
 
 class Service:
@@ -100,7 +107,7 @@ class Service:
     ) -> httpx.Response:
         """Raises Refusal."""
         given = {name: value for name, value in query.items() if value is not None}
-        headers = {"Content-Type": media_type} if media_type else {}
+        headers = _session() | ({"Content-Type": media_type} if media_type else {})
         answer = await self._http.request(
             method, path, params=given, json=body, content=content, headers=headers
         )

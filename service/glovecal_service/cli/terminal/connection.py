@@ -37,7 +37,7 @@ def connect() -> Iterator[RestClient]:
         from glovecal_client.rest import RestClient
 
         try:
-            client = RestClient(url)
+            client = RestClient(url, key=os.environ.get("GLOVECAL_KEY"))
         except BadName as error:
             raise BadInput(f"GLOVECAL_URL: {error}") from error
         with client, _warnings_told(client):

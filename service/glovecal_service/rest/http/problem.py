@@ -109,7 +109,8 @@ def warn(response: Response, sentence: str) -> None:
 
 
 _MEANING = {
-    403: "A page of another site asked for a change.",
+    401: "The service asks who you are, and no valid key was sent.",
+    403: "The key's role may not do this, or a page of another site asked for a change.",
     404: "There is no such thing (or the path is not a plain name).",
     408: "The body came too slowly.",
     409: "It contradicts what is stored.",
@@ -121,8 +122,8 @@ _MEANING = {
     503: "The database does not answer, or the service is not ready.",
     507: "The disk is full; nothing was kept.",
 }
-_ANYWHERE = (404, 421, 422, 500, 503)
-_CHANGING = (403, 408, 413, 507)
+_ANYWHERE = (401, 403, 404, 421, 422, 500, 503)
+_CHANGING = (408, 413, 507)
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:

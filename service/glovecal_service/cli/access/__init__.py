@@ -1,0 +1,1 @@
+"""Keys and the log of changes: ``glovecal key``, ``glovecal audit``."""

@@ -1,0 +1,1 @@
+"""Keys, the login of the studio, and the log of changes."""

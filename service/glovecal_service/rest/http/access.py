@@ -1,0 +1,139 @@
+"""Who may do what over REST and on pages: a key or a session says who asks, a table what its role may do.
+
+On loopback nobody is asked: whoever works on this computer may read the data folder anyway. Beyond it, and
+where ``GLOVECAL_LOGIN=always`` says so, a request without a valid key is answered 401, a page goes to the
+login, and what a role may not do is 403. What is of other subjects is not there: the store itself narrows
+every statement to those of the key (``store/scope.py``).
+"""
+
+from __future__ import annotations
+
+import re
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import quote
+
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from glovecal_client.site.roles import Role, includes
+from glovecal_service.plain import plain_text
+from glovecal_service.rest.http.observation import PREFIX
+from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.request_guard import SAFE_METHODS
+from glovecal_service.store.actor import Actor, acting
+from glovecal_service.store.keys import KeyRecord, Keys
+
+COOKIE = "glovecal_session"
+LOGIN = "/login"
+OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}")
+"""What answers to everybody: it tells nothing of what is stored."""
+_ASKED_BY_POST = (
+    r"models/[^/]+/(compare|where|explain|predict|replay|series|residual|report|calibration-report"
+    r"|effect-picture)|motion(/character)?|takes/(hands|holds|preview|session-drift)"
+)
+"""Questions whose body says what is asked; nothing changes."""
+_OF_SESSIONS = (
+    r"(recordings|sampling|films|cameras|camera-files|glove-commands|gloves|serial-ports|simulated-glove"
+    r"|hidden-effects|subjects|takes|uploads|videos)(/.*)?"
+)
+RULES: tuple[tuple[str, str, Role], ...] = (
+    (r".*", r"(keys|audit)(/.*)?", "admin"),
+    (r"DELETE", r"subjects/.*", "admin"),
+    (r"GET|HEAD|OPTIONS", r".*", "viewer"),
+    (r"POST", _ASKED_BY_POST, "viewer"),
+    (r"DELETE", r"takes/[^/]+", "trainer"),
+    (r".*", r"takes/([^/]+/left-out.*|clocks.*|examination.*)|subjects/[^/]+/detectability", "trainer"),
+    (r".*", _OF_SESSIONS, "operator"),
+    (r".*", r".*", "trainer"),
+)
+"""Method, path below ``/v1`` and the least role that may; the first that fits counts."""
+NOT_OF_A_SUBJECT = re.compile(r"(films|cameras|camera-files|videos|metrics)(/.*)?")
+"""What does not say whose it is: not there for a key of some subjects."""
+
+
+def role_for(method: str, path: str) -> Role:
+    """The least role for a request; ``path`` below ``/v1``, without its first slash."""
+    for methods, paths, role in RULES:
+        if re.fullmatch(methods, method) and re.fullmatch(paths, path):
+            return role
+    raise AssertionError("the last rule fits everything")
+
+
+class AccessGuard:
+    """ASGI middleware. ``application`` has the store in its state once it has started."""
+
+    def __init__(self, app: ASGIApp, *, is_asked: bool) -> None:
+        """``is_asked``: whether anybody has to prove who they are."""
+        self.app = app
+        self.is_asked = is_asked
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        path, method = scope["path"], scope.get("method", "GET")
+        origin = (scope.get("client") or ("",))[0]
+        action = plain_text(f"{method} {path}", 200)
+        if not self.is_asked or OPEN.fullmatch(path):
+            with acting(Actor(origin=origin, action=action)):
+                await self.app(scope, receive, send)
+            return
+        keys: Keys = scope["app"].state.parts.store.keys
+        record = await run_in_threadpool(_who, keys, scope)
+        problem = _problem(record, method, path)
+        if problem is None and record is not None:
+            scope.setdefault("state", {})["key"] = record
+            subjects = None if record.subjects is None else frozenset(record.subjects)
+            with acting(Actor(record.name, origin, action, subjects)):
+                await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        elif record is None and method in SAFE_METHODS and not path.startswith(f"{PREFIX}/"):
+            page = RedirectResponse(f"{LOGIN}?page={quote(path)}", status_code=303)
+            await page(scope, receive, send)
+        elif problem is not None:
+            await problem.response(scope.get("state", {}).get("request_id"))(scope, receive, send)
+
+
+def _who(keys: Keys, scope: Scope) -> KeyRecord | None:
+    headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
+    kind, _, secret = headers.get(b"authorization", "").partition(" ")
+    if kind.lower() == "bearer":
+        return keys.of(secret.strip())
+    token = session_token(headers.get(b"cookie", ""))
+    return None if token is None else keys.of_session(token)
+
+
+def session_token(cookies: str) -> str | None:
+    """That of a ``Cookie`` header."""
+    try:
+        cookie = SimpleCookie(cookies).get(COOKIE)
+    except CookieError:
+        return None
+    return None if cookie is None else cookie.value
+
+
+def _problem(record: KeyRecord | None, method: str, path: str) -> Problem | None:
+    if record is None:
+        return Problem(
+            401,
+            "login-needed",
+            "This service asks who you are: send a key, as in `Authorization: Bearer glk_...` (for commands "
+            "GLOVECAL_KEY), one that is not revoked. An admin makes one: glovecal key add NAME --role ROLE.",
+            headers={"WWW-Authenticate": "Bearer"},
+        )
+    if not path.startswith(f"{PREFIX}/"):
+        return None
+    below = path.removeprefix(f"{PREFIX}/")
+    if record.subjects is not None and NOT_OF_A_SUBJECT.fullmatch(below):
+        return Problem(404, "not-found", "There is nothing under this path for a key of some subjects.")
+    needed = role_for(method, below)
+    if not includes(record.role, needed):
+        return Problem(
+            403,
+            "role-too-low",
+            f"Key {record.name} is of a {record.role}; this needs {needed}. An admin makes such a key: "
+            f"glovecal key add NAME --role {needed}.",
+        )
+    return None

@@ -1,0 +1,88 @@
+"""The log of changes as it is read: newest first, whole, and whether it is what was written.
+
+An entry that was edited, taken out or put elsewhere breaks the chain of hashes, and one that is missing at
+its end does not fit the head.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import select
+
+from glovecal_service.store import tables
+from glovecal_service.store.audit_trail import entry_sha256
+from glovecal_service.store.database import Database
+
+PART = 1000
+"""Entries that are read at once."""
+
+
+@dataclass(frozen=True)
+class AuditEntry:
+    id: int
+    at: datetime
+    who: str
+    origin: str
+    action: str
+    changes: list[dict[str, Any]]
+    previous: str
+    sha256: str
+
+
+class Audit:
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def list(self, *, limit: int, before: int | None = None) -> list[AuditEntry]:
+        """Newest first; ``before``: entries older than this id."""
+        statement = select(tables.audit).order_by(tables.audit.c.id.desc()).limit(limit)
+        if before is not None:
+            statement = statement.where(tables.audit.c.id < before)
+        with self._database.read() as connection:
+            return [_entry(row._mapping) for row in connection.execute(statement)]
+
+    def every(self) -> Iterator[AuditEntry]:
+        """Oldest first, in parts."""
+        after = 0
+        while True:
+            statement = select(tables.audit).where(tables.audit.c.id > after).order_by(tables.audit.c.id)
+            with self._database.read() as connection:
+                part = [_entry(row._mapping) for row in connection.execute(statement.limit(PART))]
+            if not part:
+                return
+            yield from part
+            after = part[-1].id
+
+    @property
+    def count(self) -> int:
+        """Entries that were written."""
+        with self._database.read() as connection:
+            return connection.scalar(select(tables.audit_head.c.count)) or 0
+
+    def problems(self) -> list[str]:
+        """What does not fit, a sentence each; none: the log is what was written."""
+        wrong, count, previous = [], 0, ""
+        for entry in self.every():
+            if entry.id != count + 1:
+                wrong.append(f"entries {count + 1} to {entry.id - 1} are missing")
+            elif entry.previous != previous:
+                wrong.append(f"entry {entry.id} does not follow the one before it")
+            if entry.sha256 != entry_sha256(vars(entry)):
+                wrong.append(f"entry {entry.id} was changed after it was written")
+            count, previous = entry.id, entry.sha256
+        with self._database.read() as connection:
+            columns = tables.audit_head.c.count.label("entries"), tables.audit_head.c.sha256
+            head = connection.execute(select(*columns)).one_or_none()
+        if head is None or (head.entries, head.sha256) != (count, previous):
+            written = 0 if head is None else head.entries
+            wrong.append(f"the log ends with entry {count}, but {written} were written")
+        return wrong
+
+
+def _entry(values: Mapping[Any, Any]) -> AuditEntry:
+    changes = values["changes"]
+    return AuditEntry(**{**values, "changes": getattr(changes, "document", changes)})
