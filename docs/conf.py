@@ -72,6 +72,7 @@ NAVIGATION = {
         "docs/exports",
         "docs/applications",
         "docs/deploy",
+        "docs/keys",
     ],
     "Reference": [
         "Commands <docs/commands>",

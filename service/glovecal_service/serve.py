@@ -38,6 +38,7 @@ from glovecal_client.program import (
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
+from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
 from glovecal_service.store.data_folder_lock import DataFolderLock, FolderInUse
@@ -186,7 +187,12 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     if settings.studio and find_spec("nicegui") is None:
         return f"{not_installed('the studio', 'nicegui')} (or leave it out: glovecal serve --no-studio)"
     try:
-        Store.open(settings).close()
+        with Store.open(settings) as store:
+            if asks_who(settings) and not store.keys.is_any:
+                return (
+                    f"others can reach {settings.host}, so the service asks who they are, and there is no "
+                    "admin yet; make one: glovecal key add NAME --role admin"
+                )
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
     return ""

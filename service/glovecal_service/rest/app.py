@@ -40,7 +40,7 @@ from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
 from glovecal_service.rest.http.problem import install_openapi
-from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, is_loopback
+from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who, is_loopback
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
 from glovecal_service.rest.model import (
@@ -205,8 +205,7 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
         return settings.upload_limit_bytes if _takes_files(path) else JSON_LIMIT_BYTES
 
     app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)
-    is_asked = settings.login == "always" or not is_loopback(settings.host)
-    app.add_middleware(AccessGuard, is_asked=is_asked)
+    app.add_middleware(AccessGuard, is_asked=asks_who(settings))
     app.add_middleware(RequestGuard, loopback_only=is_loopback(settings.host))
     app.add_middleware(Observation, metrics=metrics)
 

@@ -19,6 +19,10 @@ class Actor:
     subjects: frozenset[str] | None = None
     """Whose rows there are for it; None: everybody's."""
 
+    def sees(self, subject: str | None) -> bool:
+        """Whether what this subject does is shown; what nobody wears is."""
+        return self.subjects is None or subject is None or subject in self.subjects
+
 
 _ACTOR: ContextVar[Actor] = ContextVar("actor", default=Actor())  # noqa: B039  # frozen
 

@@ -47,15 +47,16 @@ def watch_changes(engine: Engine) -> None:
 @contextmanager
 def written_down(connection: Connection) -> Iterator[None]:
     """Changes of the block become one entry of the log, in the same transaction."""
-    connection.info[_OPEN] = []
+    info = connection.info  # of a connection that broke meanwhile it cannot be asked any more
+    info[_OPEN] = []
     try:
         yield
-        changes = connection.info.pop(_OPEN)
+        changes = info.pop(_OPEN)
         if changes:
             _append(connection, changes)
     finally:
-        connection.info.pop(_OPEN, None)
-        connection.info.pop(_BEFORE, None)
+        info.pop(_OPEN, None)
+        info.pop(_BEFORE, None)
 
 
 def _append(connection: Connection, changes: list[dict[str, Any]]) -> None:

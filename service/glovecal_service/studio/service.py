@@ -15,7 +15,7 @@ from fastapi import FastAPI
 from nicegui import context, ui
 
 from glovecal_service.plain import TOTAL, read
-from glovecal_service.rest.http.observation import STUDIO
+from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 
 PATIENCE_S = 300.0
 Found = TypeVar("Found")
@@ -45,8 +45,13 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
 def _session() -> dict[str, str]:
     """The cookie with which the page was opened: what it asks is asked by who opened it."""
     request = context.client.request if context.slot_stack else None
-    cookie = "" if request is None else request.headers.get("cookie", "")
-    return {"Cookie": cookie} if cookie else {}
+    token = None if request is None else request.cookies.get(SESSION_COOKIE)
+    return {} if token is None else {"Cookie": f"{SESSION_COOKIE}={token}"}
+
+
+def has_session() -> bool:
+    """Whether somebody logged in to see this page."""
+    return bool(_session())
 
 
 class Service:

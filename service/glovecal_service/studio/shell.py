@@ -17,7 +17,7 @@ from glovecal_service.studio.chosen import Chosen, chosen
 from glovecal_service.studio.drop import DropZone
 from glovecal_service.studio.heading import heading, quiet_act
 from glovecal_service.studio.next_steps import NextStepLine, next_steps
-from glovecal_service.studio.service import Refusal, Service, refusals
+from glovecal_service.studio.service import Refusal, Service, has_session, refusals
 from glovecal_service.studio.studio import Studio
 
 NAVIGATION = (
@@ -116,6 +116,8 @@ async def shell(
         ui.label("Glovecal").classes("studio-name")
         header = Header(here, title, about_models=about_models)
         header.show(about)
+        if has_session():
+            quiet_act("Log out", _log_out)
         drawer = JobsDrawer(studio)
     with ui.element("div").props('id="main" tabindex="-1"').classes("studio-main"):
         heading(1, title)
@@ -125,6 +127,13 @@ async def shell(
         await line.look()
         yield Around(DropZone(studio, about), about, header, line)
     drawer.start(line.look)
+
+
+def _log_out() -> None:
+    ui.run_javascript(_LOG_OUT)
+
+
+_LOG_OUT = """await fetch("../login", {method: "DELETE"}); location = "../login?page=/studio";"""
 
 
 # Jobs on every page: what runs and how far it is, cancel, result; what finished meanwhile is announced.

@@ -23,7 +23,8 @@ from stored_takes import LAYOUT, make_take
 
 from glovecal_client.site.roles import ROLES, Role
 from glovecal_service.rest.app import create_app
-from glovecal_service.rest.http.access import COOKIE, AccessGuard
+from glovecal_service.rest.http.access import AccessGuard
+from glovecal_service.rest.http.observation import SESSION_COOKIE
 from glovecal_service.rest.in_process import PortalTransport
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -132,7 +133,7 @@ def routes(of: Site) -> list[tuple[str, str]]:
 
 
 def filled(path: str, number: str = "0" * 12) -> str:
-    return re.sub(r"\{[^}]+\}", number, path)
+    return re.sub(r"\{[^}]+\}", "0", re.sub(r"\{[^}]+\}", number, path, count=1))
 
 
 def test_every_route_and_role_is_as_the_table_says(asked: Site) -> None:
@@ -249,9 +250,9 @@ def test_a_page_asks_for_a_key_once(asked: Site) -> None:
     cookie = let_in.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=strict" in cookie
-    token = let_in.cookies[COOKIE]
+    token = let_in.cookies[SESSION_COOKIE]
     asked.http.cookies.clear()
-    with_it = {"Cookie": f"{COOKIE}={token}"}
+    with_it = {"Cookie": f"{SESSION_COOKIE}={token}"}
     assert asked.http.get("/subjects", headers=with_it).status_code == 200
     assert asked.http.post("/subjects", headers=with_it, json={"name": "x"}).status_code == 403
     assert asked.http.delete(f"{address}/login", headers=with_it).status_code == 204

@@ -9,9 +9,9 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
-from glovecal_service.rest.http.access import COOKIE, LOGIN, session_token
+from glovecal_service.rest.http.access import LOGIN, session_token
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.observation import STUDIO
+from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 from glovecal_service.store.keys import SESSION_HOURS
 
 router = APIRouter(prefix=LOGIN, include_in_schema=False)
@@ -54,7 +54,7 @@ async def log_in(request: Request, store: StoreNeeded) -> Response:
         return _page("That is no key of this service, or it was revoked.", page, 401)
     answer = RedirectResponse(_own(page), status_code=303)
     answer.set_cookie(
-        COOKIE, token, max_age=SESSION_HOURS * 3600, httponly=True, samesite="strict",
+        SESSION_COOKIE, token, max_age=SESSION_HOURS * 3600, httponly=True, samesite="strict",
         secure=request.url.scheme == "https",
     )  # fmt: skip
     return answer
@@ -66,7 +66,7 @@ async def log_out(request: Request, store: StoreNeeded) -> Response:
     if token is not None:
         await run_in_threadpool(store.keys.end_session, token)
     answer = Response(status_code=204)
-    answer.delete_cookie(COOKIE)
+    answer.delete_cookie(SESSION_COOKIE)
     return answer
 
 

@@ -18,13 +18,17 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from glovecal_client.site.roles import Role, includes
 from glovecal_service.plain import plain_text
-from glovecal_service.rest.http.observation import PREFIX
+from glovecal_service.rest.http.observation import PREFIX, SESSION_COOKIE, STUDIO
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.rest.http.request_guard import SAFE_METHODS
 from glovecal_service.store.actor import Actor, acting
+from glovecal_service.store.errors import NotFound
+from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.keys import KeyRecord, Keys
+from glovecal_service.store.store import Store
 
-COOKIE = "glovecal_session"
+FEED = re.compile(rf"/{STUDIO}/feed/([^/]+)")
+"""Of a page that draws a glove's hand: poses, which no statement of the store narrows."""
 LOGIN = "/login"
 OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}")
 """What answers to everybody: it tells nothing of what is stored."""
@@ -48,7 +52,9 @@ RULES: tuple[tuple[str, str, Role], ...] = (
     (r".*", r".*", "trainer"),
 )
 """Method, path below ``/v1`` and the least role that may; the first that fits counts."""
-NOT_OF_A_SUBJECT = re.compile(r"(films|cameras|camera-files|videos|metrics)(/.*)?")
+NOT_OF_A_SUBJECT = re.compile(
+    r"(films|cameras|camera-files|metrics|glove-commands|glove-devices|serial-ports|simulated-glove)(/.*)?"
+)
 """What does not say whose it is: not there for a key of some subjects."""
 
 
@@ -79,14 +85,18 @@ class AccessGuard:
             with acting(Actor(origin=origin, action=action)):
                 await self.app(scope, receive, send)
             return
-        keys: Keys = scope["app"].state.parts.store.keys
-        record = await run_in_threadpool(_who, keys, scope)
+        store: Store = scope["app"].state.parts.store
+        record = await run_in_threadpool(_who, store.keys, scope)
         problem = _problem(record, method, path)
         if problem is None and record is not None:
             scope.setdefault("state", {})["key"] = record
             subjects = None if record.subjects is None else frozenset(record.subjects)
             with acting(Actor(record.name, origin, action, subjects)):
-                await self.app(scope, receive, send)
+                feed = FEED.fullmatch(path)
+                if feed is None or await run_in_threadpool(_is_seen, store.gloves, feed[1]):
+                    await self.app(scope, receive, send)
+                else:
+                    await send({"type": "websocket.close", "code": 1008})
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         elif record is None and method in SAFE_METHODS and not path.startswith(f"{PREFIX}/"):
@@ -94,6 +104,14 @@ class AccessGuard:
             await page(scope, receive, send)
         elif problem is not None:
             await problem.response(scope.get("state", {}).get("request_id"))(scope, receive, send)
+
+
+def _is_seen(gloves: Gloves, glove: str) -> bool:
+    try:
+        gloves.get(glove)
+    except NotFound:
+        return False
+    return True
 
 
 def _who(keys: Keys, scope: Scope) -> KeyRecord | None:
@@ -108,7 +126,7 @@ def _who(keys: Keys, scope: Scope) -> KeyRecord | None:
 def session_token(cookies: str) -> str | None:
     """That of a ``Cookie`` header."""
     try:
-        cookie = SimpleCookie(cookies).get(COOKIE)
+        cookie = SimpleCookie(cookies).get(SESSION_COOKIE)
     except CookieError:
         return None
     return None if cookie is None else cookie.value

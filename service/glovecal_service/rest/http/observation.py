@@ -61,6 +61,8 @@ PREFIX = "/v1"
 # ours: asgi-correlation-id 5.0.1 replaces 7 lines here by 10 of set-up, and logs a warning for each bad id
 REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
 
+SESSION_COOKIE = "glovecal_session"
+"""Of a browser in which somebody logged in."""
 STUDIO = "studio"
 """The client's name in requests that its pages make, and where they are: looking there again and again
 fills no log."""

@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from glovecal_service.rest.http.problem import Problem
+from glovecal_service.settings import Settings
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 LONGEST_PATH = 1024
@@ -58,6 +59,11 @@ class RequestGuard:
         if _changes_something(scope) and not _same_origin(headers, host):
             return Problem(403, "foreign-origin", "A page of another site may not change anything here.")
         return None
+
+
+def asks_who(settings: Settings) -> bool:
+    """Whether whoever asks has to prove who they are."""
+    return settings.login == "always" or not is_loopback(settings.host)
 
 
 def is_loopback(host: str) -> bool:

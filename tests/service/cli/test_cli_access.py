@@ -1,0 +1,40 @@
+"""Keys and the log of changes on the command line, and a service beyond loopback that has no admin yet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from cli_running import Run, glovecal
+
+
+def test_a_key_is_made_listed_and_revoked_and_the_log_tells_it(run: Run, tmp_path: Path) -> None:
+    assert run("subject", "add", "anna").code == 0
+    made = run("key", "add", "lena", "--role", "trainer", "--subject", "anna")
+    assert made.code == 0, made.err
+    key = made.out.splitlines()[0]
+    assert key.startswith("glk_")
+    assert "of anna alone" in made.out
+    listed = run("key", "list")
+    assert "lena" in listed.out
+    assert key not in listed.out
+    assert run("key", "revoke", "lena").code == 0
+    assert json.loads(run("key", "list", "--json").out)[0]["revoked_at"]
+    again = run("key", "add", "lena")
+    assert again.code == 1
+    assert "names are not used again" in again.said
+    told = run("audit", "list", "--json")
+    assert [entry["changes"][0]["table"] for entry in json.loads(told.out)] == ["keys", "keys", "subjects"]
+    assert "keys lena" in run("audit", "list").out
+    assert "3 entries, each as it was written" in run("audit", "verify").out
+    assert run("audit", "export", tmp_path / "changes.jsonl").code == 0
+    lines = (tmp_path / "changes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["id"] for line in lines] == [1, 2, 3]
+    assert key not in "".join(lines)
+
+
+def test_a_service_that_others_reach_does_not_start_without_an_admin(tmp_path: Path) -> None:
+    settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_HOST": "0.0.0.0", "GLOVECAL_PORT": "0"}
+    refused = glovecal(settings | {"GLOVECAL_ZENOH": "tcp/127.0.0.1:0"}, "serve")
+    assert refused.code == 1
+    assert "make one: glovecal key add NAME --role admin" in refused.said

@@ -1,0 +1,74 @@
+"""The studio of a service that asks who one is: a key typed once, and a page asks as who opened it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+from realtime_support import free_endpoint, part_of_service, store_model
+from studio_support import PATIENCE_MS
+
+from glovecal_service.serve import web
+from glovecal_service.settings import Settings
+from glovecal_service.store.store import Store
+
+pytestmark = pytest.mark.needs_chromium
+
+
+@pytest.fixture(scope="module")
+def asking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, dict[str, str]]]:
+    """The address, and keys by name; subjects anna and ben have a model each."""
+    port = int(free_endpoint().rpartition(":")[2])
+    data = tmp_path_factory.mktemp("asking") / "data"
+    settings = Settings(data=data, zenoh=free_endpoint(), port=port, workers=1, login="always")
+    with Store.open(settings) as store:
+        for subject in ("anna", "ben"):
+            store_model(store, subject, degrees_per_count=0.5)
+        keys = {"of anna": store.keys.create("of-anna", "trainer", ["anna"])[1]}
+        keys["looking"] = store.keys.create("looking", "viewer")[1]
+    with ExitStack() as running:
+        running.enter_context(part_of_service(web, settings))
+        yield f"http://127.0.0.1:{port}", keys
+
+
+def test_a_key_is_typed_once_and_pages_show_what_is_its(
+    browser: Browser, asking: tuple[str, dict[str, str]], tmp_path: Path
+) -> None:
+    address, keys = asking
+    context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme="dark")
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(f"{address}/studio/models")
+    expect(page).to_have_url(f"{address}/login?page=/studio/models")
+    page.get_by_label("Your key").fill("glk_wrong")
+    page.get_by_role("button", name="Log in").click()
+    expect(page.get_by_role("alert")).to_contain_text("no key of this service")
+    page.get_by_label("Your key").fill(keys["of anna"])
+    page.get_by_role("button", name="Log in").click()
+    expect(page).to_have_url(f"{address}/studio/models")
+    expect(page.get_by_role("heading", name="Models", level=1)).to_be_visible()
+    expect(page.get_by_text("anna").first).to_be_visible()
+    expect(page.get_by_text("ben", exact=True)).to_have_count(0)
+    page.get_by_role("button", name="Log out").click()
+    expect(page).to_have_url(f"{address}/login?page=/studio")
+    assert complaints == []
+    context.close()
+
+
+def test_who_may_look_only_is_told_so(browser: Browser, asking: tuple[str, dict[str, str]]) -> None:
+    address, keys = asking
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{address}/login?page=/studio/start")
+    page.get_by_label("Your key").fill(keys["looking"])
+    page.get_by_role("button", name="Log in").click()
+    expect(page.get_by_role("heading", level=1)).to_be_visible()
+    page.get_by_role("button", name="simulated glove").first.click()
+    expect(page.get_by_text("Key looking is of a viewer; this needs operator")).to_be_visible()
+    context.close()
