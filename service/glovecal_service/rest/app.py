@@ -14,6 +14,9 @@ from starlette.concurrency import run_in_threadpool
 from starlette.routing import BaseRoute
 
 from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.camera.started_cameras import CameraAccess
+from glovecal_service.filming import Filming
+from glovecal_service.first_run.simulated_glove import StreamedGlove
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.rest import asking
@@ -142,7 +145,10 @@ def create_app(
         opened = store or await run_in_threadpool(Store.open, settings)
         uploads_folder = UploadFolder(settings.uploads_folder)
         await run_in_threadpool(uploads_folder.sweep)
-        app.state.parts = Parts(settings, opened, uploads_folder, metrics, Predictors(opened))
+        app.state.parts = Parts(
+            settings, opened, uploads_folder, metrics, Predictors(opened), Filming(settings.films_folder),
+            CameraAccess(settings.zenoh), StreamedGlove(settings),
+        )  # fmt: skip
         dispatcher = Dispatcher(opened, settings, ANSWERED, of_one_command=of_one_command)
         dispatcher.start()
         sweeping = asyncio.create_task(_sweep_hourly(opened, settings))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
+
+from sqlalchemy import Connection
 
 
 @dataclass(frozen=True)
@@ -24,18 +23,10 @@ class Actor:
         return self.subjects is None or subject is None or subject in self.subjects
 
 
-_ACTOR: ContextVar[Actor] = ContextVar("actor", default=Actor())  # noqa: B039  # frozen
+NOBODY_ELSE = Actor()
+OPTION = "glovecal_actor"
+"""Of a connection: what happens on it is asked by this actor."""
 
 
-def actor() -> Actor:
-    return _ACTOR.get()
-
-
-@contextmanager
-def acting(as_one: Actor) -> Iterator[None]:
-    """Inside the block, and in threads begun with a copy of its context."""
-    token = _ACTOR.set(as_one)
-    try:
-        yield
-    finally:
-        _ACTOR.reset(token)
+def actor_of(connection: Connection) -> Actor:
+    return connection.get_execution_options().get(OPTION, NOBODY_ELSE)

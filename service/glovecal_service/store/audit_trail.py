@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import Connection, Delete, Engine, Insert, Table, Update, event, insert, select, update
 
 from glovecal_service.store import tables
-from glovecal_service.store.actor import actor
+from glovecal_service.store.actor import actor_of
 from glovecal_service.store.texts import json_text
 
 WATCHED: Mapping[Table, tuple[str, ...]] = {
@@ -61,7 +61,7 @@ def written_down(connection: Connection) -> Iterator[None]:
 
 def _append(connection: Connection, changes: list[dict[str, Any]]) -> None:
     head = connection.execute(select(tables.audit_head).with_for_update()).one()
-    who = actor()
+    who = actor_of(connection)
     number = int(head._mapping["count"]) + 1  # a row has a method of this name
     entry = {
         "id": number, "at": datetime.now(UTC), "changes": changes, "previous": head.sha256,

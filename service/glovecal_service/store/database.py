@@ -18,6 +18,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -36,6 +37,7 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
 from glovecal_service.store import tables
+from glovecal_service.store.actor import OPTION, Actor
 from glovecal_service.store.audit_trail import watch_changes, written_down
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
 from glovecal_service.store.scope import narrow_statements
@@ -81,6 +83,13 @@ class Database:
         narrow_statements(self.engine)
         watch_changes(self.engine)
         self._writing = self.engine.execution_options(glovecal_begin="BEGIN IMMEDIATE")
+
+    def acting_as(self, actor: Actor) -> Database:
+        """The same database, asked by somebody: it is narrowed to what they see, and changes are theirs."""
+        bound = copy(self)
+        bound.engine = self.engine.execution_options(**{OPTION: actor})
+        bound._writing = self._writing.execution_options(**{OPTION: actor})
+        return bound
 
     @property
     def file(self) -> Path | None:

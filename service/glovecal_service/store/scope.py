@@ -29,7 +29,7 @@ from sqlalchemy import (
 from sqlalchemy.sql import visitors
 
 from glovecal_service.store import tables
-from glovecal_service.store.actor import actor
+from glovecal_service.store.actor import actor_of
 from glovecal_service.store.errors import NotFound
 
 _OWN = {tables.subjects: tables.subjects.c.name} | {
@@ -52,7 +52,7 @@ def narrow_statements(engine: Engine) -> None:
 def _narrowed(
     connection: Connection, statement: Any, many: Any, values: Any, options: Any
 ) -> tuple[Any, Any, Any]:
-    subjects = actor().subjects
+    subjects = actor_of(connection).subjects
     if subjects is not None and isinstance(statement, Select | Update | Delete | Insert):
         if isinstance(statement, Insert):
             _require_own(statement, many, values, subjects)

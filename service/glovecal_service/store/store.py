@@ -10,6 +10,7 @@ from types import TracebackType
 
 from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
+from glovecal_service.store.actor import NOBODY_ELSE, Actor
 from glovecal_service.store.audit import Audit
 from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
 from glovecal_service.store.data_folder_lock import LOCK, WHO
@@ -32,6 +33,9 @@ class Store:
     def __init__(self, database: Database, artifacts: Artifacts, clock: Callable[[], float]) -> None:
         self.database = database
         self.artifacts = artifacts
+        self.actor = NOBODY_ELSE
+        """Who asks."""
+        self._clock = clock
         self.subjects = Subjects(database)
         self.layouts = Layouts(database)
         self.gloves = Gloves(database)
@@ -72,6 +76,12 @@ class Store:
             database.close()
             raise
         return cls(database, Artifacts(blobs), clock)
+
+    def acting_as(self, actor: Actor) -> Store:
+        """The same store, asked by somebody: what they do not see is not there, and changes are theirs."""
+        bound = Store(self.database.acting_as(actor), self.artifacts, self._clock)
+        bound.actor = actor
+        return bound
 
     def close(self) -> None:
         """Give the connections back; the store can still be used afterwards and opens new ones."""

@@ -16,7 +16,6 @@ from glovecal_service.realtime.service_status import all_service_statuses
 from glovecal_service.rest.glove.answer import LiveGlove
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.problem import change_problems
-from glovecal_service.store.actor import actor
 from glovecal_service.store.errors import Conflict
 
 router = APIRouter(prefix="/live-gloves", tags=["gloves"])
@@ -41,7 +40,7 @@ def live_gloves(parts: PartsNeeded) -> list[LiveGlove]:
         gloves = (json_object(answer.payload.to_bytes()) or {}).get("gloves")
         for glove, one in gloves.items() if isinstance(gloves, dict) else ():
             view = _as_said(glove, one, on_for.get(glove))
-            if view is not None and actor().sees(view.subject):
+            if view is not None and parts.store.actor.sees(view.subject):
                 found.setdefault(glove, view)
     return list(found.values())
 

@@ -9,6 +9,7 @@ every statement to those of the key (``store/scope.py``).
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import quote
 
@@ -21,7 +22,7 @@ from glovecal_service.plain import plain_text
 from glovecal_service.rest.http.observation import PREFIX, SESSION_COOKIE, STUDIO
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.rest.http.request_guard import SAFE_METHODS
-from glovecal_service.store.actor import Actor, acting
+from glovecal_service.store.actor import Actor
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.keys import KeyRecord, Keys
@@ -30,6 +31,7 @@ from glovecal_service.store.store import Store
 FEED = re.compile(rf"/{STUDIO}/feed/([^/]+)")
 """Of a page that draws a glove's hand: poses, which no statement of the store narrows."""
 LOGIN = "/login"
+LONGEST_ACTION = 200
 OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}")
 """What answers to everybody: it tells nothing of what is stored."""
 _ASKED_BY_POST = (
@@ -79,31 +81,33 @@ class AccessGuard:
             await self.app(scope, receive, send)
             return
         path, method = scope["path"], scope.get("method", "GET")
-        origin = (scope.get("client") or ("",))[0]
-        action = plain_text(f"{method} {path}", 200)
+        asking = Actor(
+            origin=(scope.get("client") or ("",))[0], action=plain_text(f"{method} {path}", LONGEST_ACTION)
+        )
+        state = scope.setdefault("state", {})
+        state["actor"] = asking
         if not self.is_asked or OPEN.fullmatch(path):
-            with acting(Actor(origin=origin, action=action)):
-                await self.app(scope, receive, send)
+            await self.app(scope, receive, send)
             return
         store: Store = scope["app"].state.parts.store
         record = await run_in_threadpool(_who, store.keys, scope)
         problem = _problem(record, method, path)
-        if problem is None and record is not None:
-            scope.setdefault("state", {})["key"] = record
+        if record is not None and problem is None:
             subjects = None if record.subjects is None else frozenset(record.subjects)
-            with acting(Actor(record.name, origin, action, subjects)):
-                feed = FEED.fullmatch(path)
-                if feed is None or await run_in_threadpool(_is_seen, store.gloves, feed[1]):
-                    await self.app(scope, receive, send)
-                else:
-                    await send({"type": "websocket.close", "code": 1008})
-        elif scope["type"] == "websocket":
+            state["actor"] = replace(asking, name=record.name, subjects=subjects)
+            feed = FEED.fullmatch(path)
+            seen_by = store.acting_as(state["actor"]).gloves
+            if feed is None or await run_in_threadpool(_is_seen, seen_by, feed[1]):
+                await self.app(scope, receive, send)
+                return
+            problem = Problem(404, "not-found", "There is no such glove.")
+        if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         elif record is None and method in SAFE_METHODS and not path.startswith(f"{PREFIX}/"):
             page = RedirectResponse(f"{LOGIN}?page={quote(path)}", status_code=303)
             await page(scope, receive, send)
         elif problem is not None:
-            await problem.response(scope.get("state", {}).get("request_id"))(scope, receive, send)
+            await problem.response(state.get("request_id"))(scope, receive, send)
 
 
 def _is_seen(gloves: Gloves, glove: str) -> bool:

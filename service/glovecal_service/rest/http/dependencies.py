@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import anyio
@@ -25,13 +24,17 @@ LONG_ANSWERS_AT_ONCE = 2
 
 @dataclass
 class Parts:
-    """Everything the routers share; made by the application's lifespan."""
+    """Everything the routers share; made by the application's lifespan. A request has a copy of its own whose
+    store is that of who asks."""
 
     settings: Settings
     store: Store
     uploads: UploadFolder
     metrics: Metrics
     predictors: Predictors
+    filming: Filming
+    cameras: CameraAccess
+    streamed_glove: StreamedGlove
     import_slots: anyio.CapacityLimiter = field(
         default_factory=lambda: anyio.CapacityLimiter(IMPORTS_AT_ONCE)
     )
@@ -41,29 +44,18 @@ class Parts:
     )
     """The same for answers that are worked out in a process of their own."""
 
-    @cached_property
-    def filming(self) -> Filming:
-        return Filming(self.settings.films_folder)
-
-    @cached_property
-    def cameras(self) -> CameraAccess:
-        return CameraAccess(self.settings.zenoh)
-
-    @cached_property
-    def streamed_glove(self) -> StreamedGlove:
-        return StreamedGlove(self.settings)
-
     @property
     def videos(self) -> Videos:
         return Videos(self.settings.videos_folder)
 
 
-def _parts(request: Request) -> Parts:
-    return request.app.state.parts
-
-
 def _store(request: Request) -> Store:
-    return request.app.state.parts.store
+    """As who asks sees it: what they do not see is not there, and changes are theirs."""
+    return request.app.state.parts.store.acting_as(request.state.actor)
+
+
+def _parts(request: Request) -> Parts:
+    return replace(request.app.state.parts, store=_store(request))
 
 
 PartsNeeded = Annotated[Parts, Depends(_parts)]
