@@ -26,6 +26,7 @@ from glovecal_client.errors import ClientError
 from glovecal_service.settings import Settings
 from glovecal_service.studio.live_feed import GloveFeed, LiveFeeds
 from glovecal_service.studio.pages import (
+    access,
     cameras,
     capture,
     compare,
@@ -48,7 +49,7 @@ PATH = "/studio"
 FRAME_S = 1.0 / 30.0
 RECONNECT_S = 30.0
 """A page that does not answer for so long, in a computer that sleeps or is busy, starts anew."""
-PAGES = (start, live, capture, cameras, takes, take, compare, diagnose, fall, models, effects, jobs)
+PAGES = (start, live, capture, cameras, takes, take, compare, diagnose, fall, models, effects, jobs, access)
 
 
 def mount_studio(app: FastAPI, settings: Settings) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 from realtime_support import free_endpoint, part_of_service, store_model
-from studio_support import PATIENCE_MS
+from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_service.serve import web
 from glovecal_service.settings import Settings
@@ -72,3 +73,22 @@ def test_who_may_look_only_is_told_so(browser: Browser, asking: tuple[str, dict[
     page.get_by_role("button", name="simulated glove").first.click()
     expect(page.get_by_text("Key looking is of a viewer; this needs operator")).to_be_visible()
     context.close()
+
+
+def test_an_admin_makes_and_revokes_keys_and_sees_who_changed_what(opened: Open) -> None:
+    seen = opened("access")
+    page = seen.page
+    page.get_by_label("Name of the key").fill("guest")
+    page.get_by_role("button", name="Make a key").click()
+    made = page.get_by_label("The key; it is not shown again")
+    expect(made).to_have_value(re.compile("glk_.+"))
+    expect(page.get_by_role("cell", name="keys guest")).to_be_visible()
+    assert serious(page) == []
+    page.get_by_role("button", name="Make a key").click()
+    expect(page.get_by_text("names are not used again")).to_be_visible()
+    page.get_by_role("button", name="Revoke guest").click()
+    expect(page.get_by_text("Key guest is revoked")).to_be_visible()
+    expect(page.get_by_role("button", name="Revoke guest")).to_have_count(0)
+    page.get_by_role("button", name="Look whether the log is what was written").click()
+    expect(page.get_by_text(re.compile("[0-9]+ entries, each as it was written"))).to_be_visible()
+    assert seen.complaints == []
