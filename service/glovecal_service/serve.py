@@ -190,8 +190,8 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
         with Store.open(settings) as store:
             if asks_who(settings) and not store.keys.is_any:
                 return (
-                    f"others can reach {settings.host}, so the service asks who they are, and there is no "
-                    "admin yet; make one: glovecal key add NAME --role admin"
+                    f"on {settings.host} the service asks everybody who they are (GLOVECAL_HOST, "
+                    "GLOVECAL_LOGIN), and there is no admin yet; make one: glovecal key add NAME --role admin"
                 )
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
