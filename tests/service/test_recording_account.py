@@ -5,6 +5,7 @@ No network: the recording's file and the capture daemon's logs are real, and lie
 
 from __future__ import annotations
 
+import json
 import tempfile
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -19,10 +20,11 @@ from hypothesis import strategies as st
 from glovecal_client import Frame, Recording, encode_frame
 from glovecal_client.capture.log_folder import LogFolder, LogQueries
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
-from glovecal_client.gap_repair import split_frames
+from glovecal_client.gap_repair import BlockDigest, split_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_service.recorder import reconciliation
-from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience, reconcile
+from glovecal_service.recorder.log_comparison import reconcile_and_compare
+from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience
 from glovecal_service.recorder.recording_result import Settlement
 from glovecal_service.recorder.run_ledger import BEGIN, RunLedger
 
@@ -77,6 +79,15 @@ class Capture:
             return split_frames(self.queries.answer(f"run={run_id:016x};from={first};to={last}"))
         except BadName as error:
             raise QueryRefused(str(error)) from error
+
+    def digest(self, run_id: int, first: int, last: int) -> BlockDigest | None:
+        self._check()
+        try:
+            answer = self.queries.answer(f"run={run_id:016x};from={first};to={last};digest=sha256")
+        except BadName as error:
+            raise QueryRefused(str(error)) from error
+        found = json.loads(answer)
+        return BlockDigest(**found) if found["frames"] else None
 
     def _check(self) -> None:
         if not self.reachable:
@@ -140,7 +151,7 @@ class Story:
 
     def settle(self, stop_ns: int) -> Settlement:
         file = RunLedger.resume(self.path)
-        outcome = reconcile(file, self.capture, stop_ns, Patience(60.0, Event()))
+        outcome = reconcile_and_compare(file, self.capture, stop_ns, Patience(60.0, Event()))
         file.close()
         return Settlement.of(file, outcome)
 

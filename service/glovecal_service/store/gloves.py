@@ -65,14 +65,16 @@ class Gloves:
 
     def remove(self, name: str) -> None:
         """Forget the glove and who wears it; its takes and recordings stay. Raises NotFound, Conflict while
-        it is being recorded."""
+        a recording of it is not settled."""
+        table = tables.recordings
+        unsettled = (table.c.glove == name) & table.c.state.in_((*OPEN_RECORDING_STATES, "repairing"))
         with self._database.write() as connection:
             _require(connection, name)
-            table = tables.recordings
-            open_ones = (table.c.glove == name) & table.c.state.in_(OPEN_RECORDING_STATES)
-            if connection.execute(select(table.c.id).where(open_ones).limit(1)).first() is not None:
+            recording = connection.execute(select(table.c.name, table.c.state).where(unsettled)).first()
+            if recording is not None:
                 raise Conflict(
-                    f"glove {name!r} is being recorded; end that first: glovecal record stop --glove {name}"
+                    f"recording {recording.name!r} of glove {name!r} is {recording.state}; remove the glove "
+                    "once that is done"
                 )
             connection.execute(delete(tables.gloves).where(tables.gloves.c.name == name))
             grow_revision(connection)
