@@ -29,7 +29,7 @@ from glovecal_service.recorder.log_comparison import reconcile_and_compare
 from glovecal_service.recorder.pre_roll import pre_roll_request
 from glovecal_service.recorder.reconciliation import CaptureLog, Patience
 from glovecal_service.recorder.recording_result import Settlement, keep_as_take
-from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
+from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, FINDINGS, SUFFIX, RunLedger
 from glovecal_service.recorder.sampling_runner import SamplingRunner
 from glovecal_service.settings import Settings
 from glovecal_service.store.database import now
@@ -192,7 +192,7 @@ class Recorder:
             return
 
         def file() -> RunLedger:
-            known = record.facts.get("runs", ())
+            known = record.facts.get(FINDINGS)
             return RunLedger.resume(path, known) if interrupted else self._create(store, record, path)
 
         live = self._live[record.id] = LiveRecording(self._session, self._keys(record), file)
@@ -374,7 +374,7 @@ def settle(
     patience: Patience,
 ) -> Settlement:
     """The account of a closed file, repaired as far as ``patience`` allows; ``account``: what is known."""
-    file = RunLedger.resume(path, account.get("runs", ()))
+    file = RunLedger.resume(path, account.get(FINDINGS))
     try:
         outcome = reconcile_and_compare(file, log, stop_wall_ns, patience)
     finally:

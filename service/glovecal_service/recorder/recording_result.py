@@ -21,7 +21,15 @@ from glovecal_models.takes.take import Take
 from glovecal_service.recorder.pre_roll import PreRollRequest
 from glovecal_service.recorder.reconciliation import Outcome
 from glovecal_service.recorder.run_books import OWN_CLOCK, SequenceRanges
-from glovecal_service.recorder.run_ledger import CAPTURE, SUFFIX, TAKEN_OUT, RunLedger, usable_frames
+from glovecal_service.recorder.run_ledger import (
+    CAPTURE,
+    FINDINGS,
+    SUFFIX,
+    TAKEN_OUT,
+    RunLedger,
+    frames_taken_out,
+    usable_frames,
+)
 from glovecal_service.recorder.trigger_times import trigger_facts
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY, PRE_ROLL
@@ -70,7 +78,7 @@ def recording_account(
     wish = PreRollRequest.of_document(file.meta.get(PRE_ROLL))
     if why_shorter is None:
         why_shorter = "the recording was interrupted" if file.pre_roll_s < wish.most_s - 1.0 else ""
-    runs = [file.document_of(books) for books in file.runs.values()]
+    runs = [books.document() for books in file.runs.values()]
     gaps = [gap for run in runs for gap in run["missing"]]
     frames = sum(last - first + 1 for first, last in gaps)
     said_later = {} if CAPTURE in file.meta or not file.capture else {CAPTURE: file.capture}
@@ -87,6 +95,7 @@ def recording_account(
         "pending_frames": 0 if complete else frames,
         "refused": refused,
         TAKEN_OUT: sum(map(len, file.taken_out.values())),
+        FINDINGS: file.findings(),
         PRE_ROLL: wish.account(len(file.pre_roll), file.pre_roll_s, why_shorter),
         "runs": runs,
         "file": file.path.name,
@@ -124,9 +133,7 @@ def keep_as_take(
         wearing=record.wearing or "",
         first_sequence=account["first_sequence"],
         capture=record.facts.get(CAPTURE) or glove.meta,
-        taken_out={
-            int(run["run_id"], 16): SequenceRanges.of(run.get(TAKEN_OUT, ())) for run in account["runs"]
-        },
+        taken_out=frames_taken_out(account[FINDINGS]),
     )
     take = _stored_before(store, subject, record)
     accounting = {**account, **recorded.clock, OWN_CLOCK: _own_clock(account, take)}

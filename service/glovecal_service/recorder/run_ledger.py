@@ -25,8 +25,10 @@ the recording begins with the first frame that came."""
 CAPTURE = "capture"
 """Of the header, and of a recording's facts where capture said it only later: its meta."""
 CREATED = "created_wall_ns"
+FINDINGS = "findings"
+"""Of a recording's facts: what comparing it with its capture log brought, by run."""
 TAKEN_OUT, REACHED = "taken_out", "reached"
-"""Of a run's document."""
+"""Of a run's findings."""
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
 
@@ -37,19 +39,14 @@ class RunLedger:
     What turns out not to be the capture's stays in the file and leaves the books.
     """
 
-    def __init__(self, log: FrameLog, known: Iterable[Mapping[str, Any]] = ()) -> None:
-        """``known``: what was found out about runs before, as ``document_of`` has it."""
+    def __init__(self, log: FrameLog, known: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+        """``known``: what was found out before, as ``findings`` has it."""
         self._log = log
-        self.taken_out: dict[int, SequenceRanges] = {}
+        self.taken_out = frames_taken_out(known or {})
         """By run: numbers whose frame, as it came over the wire, was not the capture's."""
-        self.reached: dict[int, int] = {}
+        self.reached = {int(run, 16): int(of[REACHED]) for run, of in (known or {}).items() if REACHED in of}
         """By run: the last number that capture gave until its end, or until after the recording's; where it
         said so."""
-        for run in known:
-            if TAKEN_OUT in run:
-                self.taken_out[int(run["run_id"], 16)] = SequenceRanges.of(run[TAKEN_OUT])
-            if REACHED in run:
-                self.reached[int(run["run_id"], 16)] = run[REACHED]
         self.runs: dict[int, RunBooks] = {}
         """In the order they began."""
         self._open_first_run()
@@ -72,7 +69,7 @@ class RunLedger:
         return cls(FrameLog.create(path, meta))
 
     @classmethod
-    def resume(cls, path: Path, known: Iterable[Mapping[str, Any]] = ()) -> RunLedger:
+    def resume(cls, path: Path, known: Mapping[str, Mapping[str, Any]] | None = None) -> RunLedger:
         """A file that was left when its process was killed, cut back to its last whole record.
 
         ``known`` is as above. Raises DamagedLog, OSError.
@@ -110,14 +107,16 @@ class RunLedger:
         """Capture says so, at the run's end or after the recording's."""
         self.reached[run_id] = max(sequence, self.reached.get(run_id, -1))
 
-    def document_of(self, books: RunBooks) -> dict[str, Any]:
-        """What a run came to, and what was found out about it."""
-        out, reached = self.taken_out.get(books.run_id), self.reached.get(books.run_id)
-        return (
-            books.document()
-            | ({} if out is None else {TAKEN_OUT: [list(gap) for gap in out]})
-            | ({} if reached is None else {REACHED: reached})
-        )
+    def findings(self) -> dict[str, dict[str, Any]]:
+        """By run, 16 hexadecimal digits: what is to be known when the file is resumed, or read."""
+        found: dict[str, dict[str, Any]] = {}
+        for run_id, out in self.taken_out.items():
+            if not out:
+                continue
+            found.setdefault(f"{run_id:016x}", {})[TAKEN_OUT] = [list(gap) for gap in out]
+        for run_id, sequence in self.reached.items():
+            found.setdefault(f"{run_id:016x}", {})[REACHED] = sequence
+        return found
 
     def recorded(self) -> dict[int, RecordedFrames]:
         """The frames in the file by run, without those that were taken out."""
@@ -257,6 +256,11 @@ class RunLedger:
         for run in self.runs.values():
             run.count_again()
         self._enter_all()
+
+
+def frames_taken_out(findings: Mapping[str, Mapping[str, Any]]) -> dict[int, SequenceRanges]:
+    """By run."""
+    return {int(run, 16): SequenceRanges.of(found.get(TAKEN_OUT, ())) for run, found in findings.items()}
 
 
 def usable_frames(recording: Recording, taken_out: Mapping[int, SequenceRanges]) -> Iterator[Frame]:
