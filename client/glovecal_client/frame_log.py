@@ -132,6 +132,12 @@ class Recording:
             for _, payload in scan_records(file, self.first_record):
                 yield payload
 
+    def places(self) -> Iterator[tuple[int, bytes]]:
+        """Where in the file each payload begins, and the payload."""
+        with self.path.open("rb") as file:
+            for end, payload in scan_records(file, self.first_record):
+                yield end - len(payload), payload
+
     def frames(self) -> Iterator[Frame]:
         """The frames in the order they were written. Raises WireError for a record that is no frame."""
         return map(decode_frame, self.payloads())

@@ -1,18 +1,21 @@
-"""Fetching frames that were missed on the wire from the capture daemon's log."""
+"""Frames of the capture daemon's log: those missed on the wire are fetched, those that came are compared."""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import struct
+from collections.abc import Iterable
 
 import zenoh
 
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys
-from glovecal_client.session import ask
-from glovecal_client.wire.frame import MAX_FRAME_BYTES, Frame, FrameFlag, decode_frame
+from glovecal_client.session import ask, ask_json
+from glovecal_client.wire.frame import MAX_FRAME_BYTES, Frame, FrameFlag, decode_frame, encode_frame
 
 _LENGTH = struct.Struct("<I")
+_FLAGS_AT = 5
 
 
 def fetch_frames(
@@ -82,3 +85,53 @@ def split_frames(block: bytes) -> list[Frame]:
         frames.append(dataclasses.replace(frame, flags=frame.flags | FrameFlag.REPAIRED))
         at += length
     return frames
+
+
+@dataclasses.dataclass(frozen=True)
+class BlockDigest:
+    """What a log has of the frames that were asked for, as many as one reply holds."""
+
+    frames: int
+    first: int
+    """Sequence number of the first of them."""
+    last: int
+    sha256: str
+    """As ``digest_of`` makes it of the same frames."""
+
+
+def fetch_digest(
+    session: zenoh.Session, keys: GloveKeys, run_id: int, first: int, last: int, *, timeout_s: float = 5.0
+) -> BlockDigest | None:
+    """The digest of the block that ``fetch_block`` would bring; None: the log has none of these frames.
+
+    Raises NoAnswer if nobody answers, QueryRefused if the log cannot be read or is not there, also by a
+    capture of before there were digests; WireError if the answer is damaged.
+    """
+    selector = f"{keys.log}?run={run_id:016x};from={first};to={last};digest=sha256"
+    answer = ask_json(session, selector, timeout_s=timeout_s)
+    try:
+        if not (frames := int(answer["frames"])):
+            return None
+        digest = BlockDigest(frames, int(answer["first"]), int(answer["last"]), str(answer["sha256"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise WireError(f"{selector}: the answer is not a digest") from error
+    if not first <= digest.first <= digest.last <= last:
+        raise WireError(f"{selector}: the answer is on frames {digest.first} to {digest.last}")
+    return digest
+
+
+def digest_of(messages: Iterable[bytes]) -> str:
+    """Of frames as the log has them (``as_logged``), in order; 64 hexadecimal digits."""
+    found = hashlib.sha256()
+    for message in messages:
+        found.update(_LENGTH.pack(len(message)))
+        found.update(message)
+    return found.hexdigest()
+
+
+def as_logged(message: bytes) -> bytes:
+    """A frame's message as it lies in its capture log: one that was fetched is flagged as repaired since."""
+    if not message[_FLAGS_AT] & FrameFlag.REPAIRED:
+        return message
+    frame = decode_frame(message)
+    return encode_frame(dataclasses.replace(frame, flags=frame.flags & ~FrameFlag.REPAIRED))

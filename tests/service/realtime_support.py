@@ -110,6 +110,7 @@ class WireGlove:
         self.sent = 0
         self._session = session
         self._subject = subject
+        self._token = session.liveliness().declare_token(self.keys.alive)
         # what a test sends arrives: a busy computer's full queue would drop it
         self._raw = session.declare_publisher(
             self.keys.raw, express=True, congestion_control=zenoh.CongestionControl.BLOCK
@@ -127,6 +128,10 @@ class WireGlove:
             "run_id": f"{self.run_id:016x}",
         }
         self._session.put(self.keys.meta, json.dumps(meta | changes))
+
+    def restart(self) -> None:
+        """As when its capture is started again: another run, which may say something else of itself."""
+        self.run_id, self.sequence = secrets.randbits(64), 0
 
     def frame(self, readings: tuple[float, ...] = (120.0, 130.0, 140.0), **changes: Any) -> Frame:
         """The next frame, or a variation of it."""

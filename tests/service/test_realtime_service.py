@@ -138,6 +138,7 @@ def test_a_glove_of_the_other_hand_is_told_with_its_first_frames(
             return served_by and row["sentence"].startswith("wrong hand")
 
         eventually(told, "the page's row")
+    glove.restart()
     glove.say_meta(hand="right")
     eventually(lambda: not ask_meta(session, glove)["sentence"], "exchanged")
 
@@ -184,6 +185,7 @@ def test_effects_are_told_the_wearing_and_the_context(
     assert (poses.live[0].state_reset, poses.live[0].settling) == (True, True)
     effects = glove_status(session, settings, "g-effie")["effects"]
     assert effects["sentences"] == ["context temperature_c is not sent: temperature is not corrected"]
+    glove.restart()
     glove.say_meta(wearing="monday", context=["temperature_c"])
 
     def is_corrected() -> bool:
@@ -200,7 +202,7 @@ def test_effects_are_told_the_wearing_and_the_context(
 
     def is_another_wearing() -> bool:
         glove.send(context=np.array([30.0], np.float32))
-        return glove_status(session, settings, "g-effie")["effects"]["starts"] == 2
+        return glove_status(session, settings, "g-effie")["effects"]["starts"] == 3  # a new run did, too
 
     eventually(is_another_wearing, "a new wearing begins anew")
     said = glove_status(session, settings, "g-effie")["effects"]["sentences"]
@@ -238,6 +240,7 @@ def test_a_damaged_artifact_is_named_and_the_model_before_it_stays(
     glove = WireGlove(session, settings, "g-carla", subject="carla")
     glove.say_meta()
     eventually(lambda: served(session, glove, good), "good model")
+    store.gloves.seen("g-carla", {"layout": LAYOUT.name, "subject": "carla"})
     bad = store_model(store, "carla", degrees_per_count=1.0, activate=False)
     path = next(settings.artifacts_folder.rglob(f"*{bad}*"))
     content = path.read_bytes()
@@ -406,16 +409,15 @@ def test_a_layout_is_matched_by_its_sensors_whatever_its_name_and_their_order(
 )
 def test_where_no_model_fits_the_sentence_says_why(store: Store, sensors: list[str], why: str) -> None:
     model_id = store_model(store, "hugo", degrees_per_count=0.5)
-    store.gloves.seen("g-hugo", {"layout": "other", "subject": "hugo"})
-    serving = choose(store, "g-hugo", {"sensors": sensors}, {})
+    meta = {"layout": "other", "subject": "hugo", "sensors": sensors}
+    serving = choose(store, "g-hugo", meta, {})
     assert serving.model is None
     assert f"model {model_id[:12]} {why}" in serving.sentence
     assert serving.sentence.startswith("subject hugo has no active model for this glove (layout other); ")
 
 
 def test_models_that_are_not_active_are_named(store: Store) -> None:
-    store.gloves.seen("g-ida", {"layout": "other", "subject": "ida"})
-    meta = {"sensors": list(LAYOUT.sensors)}
+    meta = {"layout": "other", "subject": "ida", "sensors": list(LAYOUT.sensors)}
     store.subjects.create("ida")
     assert "subject ida has no model yet; train one" in choose(store, "g-ida", meta, {}).sentence
     store_model(store, "ida", degrees_per_count=0.5, activate=False)

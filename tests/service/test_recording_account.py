@@ -5,9 +5,10 @@ No network: the recording's file and the capture daemon's logs are real, and lie
 
 from __future__ import annotations
 
+import json
 import tempfile
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
 
@@ -19,14 +20,16 @@ from hypothesis import strategies as st
 from glovecal_client import Frame, Recording, encode_frame
 from glovecal_client.capture.log_folder import LogFolder, LogQueries
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused
-from glovecal_client.gap_repair import split_frames
+from glovecal_client.gap_repair import BlockDigest, split_frames
 from glovecal_client.keys import GloveKeys
 from glovecal_service.recorder import reconciliation
-from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience, reconcile
+from glovecal_service.recorder.log_comparison import reconcile_and_compare
+from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience
 from glovecal_service.recorder.recording_result import Settlement
-from glovecal_service.recorder.run_ledger import BEGIN, RunLedger
+from glovecal_service.recorder.run_ledger import BEGIN, FINDINGS, RunLedger, frames_taken_out, usable_frames
 
 MS = 1_000_000
+STRANGE = np.array([-1.0], np.float32)
 CLOCK_AHEAD_NS = 3_600_000 * MS
 """The capture computer's clock is an hour ahead."""
 
@@ -78,6 +81,15 @@ class Capture:
         except BadName as error:
             raise QueryRefused(str(error)) from error
 
+    def digest(self, run_id: int, first: int, last: int) -> BlockDigest | None:
+        self._check()
+        try:
+            answer = self.queries.answer(f"run={run_id:016x};from={first};to={last};digest=sha256")
+        except BadName as error:
+            raise QueryRefused(str(error)) from error
+        found = json.loads(answer)
+        return BlockDigest(**found) if found["frames"] else None
+
     def _check(self) -> None:
         if not self.reachable:
             raise NoAnswer("nobody answered")
@@ -92,6 +104,7 @@ STEPS = st.lists(
         st.tuples(st.just("killed"), st.integers(0, 5)),
         st.tuples(st.just("restarted"), st.integers(0, 2)),
         st.tuples(st.just("unreachable"), st.just(0)),
+        st.tuples(st.just("forged"), st.integers(1, 4)),
     ),
     min_size=1,
     max_size=12,
@@ -122,10 +135,29 @@ class Story:
         elif what == "jumped":
             self.capture.sequence += count
             return
+        elif what == "forged":
+            self.forge(count)
+            return
         step_ns = MS // 10 if "in no time" in what else 8 * MS
         for _ in range(count):
             frame = self.capture.frame("not logged" not in what, step_ns)
             if what.startswith("received"):
+                self.file.add(frame, encode_frame(frame))
+
+    def forge(self, count: int) -> None:
+        """Frames of a stranger: the next ones, numbers or clocks far ahead, and the last one again."""
+        last = self.capture.numbered[-1].frame
+        for number in range(count):
+            ahead = (1, 2, 400, 0)[number % 4]
+            frame = replace(
+                last,
+                sequence=self.capture.sequence + ahead if ahead else last.sequence,
+                run_id=self.capture.runs[-1].run_id,
+                monotonic_ns=last.monotonic_ns + (number % 3) * 40_000 * MS + 1,
+                wall_ns=last.wall_ns + (number % 2) * 90_000 * MS,
+                readings=STRANGE,
+            )
+            if frame.sequence >= 0:
                 self.file.add(frame, encode_frame(frame))
 
     def kill(self, frames_meanwhile: int) -> RunLedger:
@@ -140,7 +172,7 @@ class Story:
 
     def settle(self, stop_ns: int) -> Settlement:
         file = RunLedger.resume(self.path)
-        outcome = reconcile(file, self.capture, stop_ns, Patience(60.0, Event()))
+        outcome = reconcile_and_compare(file, self.capture, stop_ns, Patience(60.0, Event()))
         file.close()
         return Settlement.of(file, outcome)
 
@@ -157,9 +189,17 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
     if not account["complete"]:
         assert account["missing"] == []
         return
-    recorded = {(frame.run_id, frame.sequence) for frame in Recording.open(story.path).frames()}
+    used = list(usable_frames(Recording.open(story.path), frames_taken_out(account[FINDINGS])))
+    recorded = {(frame.run_id, frame.sequence) for frame in used}
     given = {(item.frame.run_id, item.frame.sequence) for item in story.capture.numbered}
-    assert lacking <= given, "a number that was never given is not missing"
+    if account["compared"]:
+        assert lacking <= given, "a number that was never given is not missing"
+        assert not [frame for frame in used if frame.readings[0] == -1.0], "nothing of a stranger is used"
+    in_log = [item.frame for item in story.capture.numbered if item.logged]
+    logged = {(frame.run_id, frame.sequence): frame for frame in in_log}
+    for frame in used:
+        key = (frame.run_id, frame.sequence)
+        assert key not in logged or logged[key].readings[0] == frame.readings[0], "it is the log's"
     first = (account["runs"][0]["run_id"], account["first_sequence"])
     last = {run["run_id"]: run["last_sequence"] for run in account["runs"]}
     for item in story.capture.numbered[story.begin :]:

@@ -1,12 +1,14 @@
 """The capture logs of one glove: ``DATA/capture/<site>/<glove>/<start>-<run>.glvlog``, one file a run.
 
 Frames of a run are found by sequence number while its log is still growing, and sent to whoever asks for them
-(``?run=HEX16;from=A;to=B``).
+(``?run=HEX16;from=A;to=B``), or a digest of them to whoever has them already (``;digest=sha256``).
 """
 
 from __future__ import annotations
 
 import bisect
+import hashlib
+import json
 import re
 import struct
 import threading
@@ -170,7 +172,7 @@ class LogIndex:
 
 MAX_REPLY_FRAMES = 4096
 MAX_REPLY_BYTES = 4 << 20
-_QUESTION = re.compile(r"run=([0-9a-f]{16});from=([0-9]{1,20});to=([0-9]{1,20})\Z")
+_QUESTION = re.compile(r"run=([0-9a-f]{16});from=([0-9]{1,20});to=([0-9]{1,20})(;digest=sha256)?\Z")
 _LENGTH = struct.Struct("<I")
 
 
@@ -193,14 +195,25 @@ class LogQueries:
             return self._indexes[run_id]
 
     def answer(self, parameters: str) -> bytes:
-        """The reply's payload: each frame as u32 length and bytes. Raises BadName, WireError, DamagedLog."""
+        """The reply's payload: each frame as u32 length and bytes, or JSON on what those bytes would be.
+
+        Raises BadName, WireError, DamagedLog.
+        """
         asked = _QUESTION.match(parameters)
         if not asked:
-            raise BadName(f"log query {parameters[:80]!r} is not run=HEX16;from=A;to=B")
+            raise BadName(
+                f"log query {parameters[:80]!r} is not run=HEX16;from=A;to=B, and ;digest=sha256 for a digest"
+            )
         first, last = int(asked[2]), int(asked[3])
         if first > last:
             raise BadName(f"log query: from={first} is after to={last}")
         found = self.index(int(asked[1], 16)).payloads(
             first, last, max_count=MAX_REPLY_FRAMES, max_bytes=MAX_REPLY_BYTES
         )
-        return b"".join(_LENGTH.pack(len(payload)) + payload for payload in found)
+        reply = b"".join(_LENGTH.pack(len(payload)) + payload for payload in found)
+        return _digest(found, reply) if asked[4] else reply
+
+
+def _digest(found: list[bytes], reply: bytes) -> bytes:
+    ends = {"first": frame_sequence(found[0]), "last": frame_sequence(found[-1])} if found else {}
+    return json.dumps({"frames": len(found), **ends, "sha256": hashlib.sha256(reply).hexdigest()}).encode()

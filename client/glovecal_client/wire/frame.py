@@ -41,6 +41,7 @@ _VERSION = 1
 _HEAD = struct.Struct("<4sBBHQqqQHH")
 _SEQUENCE = struct.Struct("<Q")
 _SEQUENCE_AT = 8
+_RUN_ID_AT = 32
 MAX_FRAME_BYTES = _HEAD.size + 4 * (MAX_SENSORS + MAX_CONTEXT) + CHECKSUM_BYTES
 
 
@@ -136,6 +137,11 @@ def decode_frame(message: bytes) -> Frame:
 def frame_sequence(message: bytes) -> int:
     """The sequence number of a frame that is known to be whole, without decoding the rest."""
     return _SEQUENCE.unpack_from(message, _SEQUENCE_AT)[0]
+
+
+def frame_run_id(message: bytes) -> int:
+    """The run id of a frame that is known to be whole, without decoding the rest."""
+    return _SEQUENCE.unpack_from(message, _RUN_ID_AT)[0]
 
 
 def _check_values(readings: np.ndarray, context: np.ndarray) -> None:

@@ -24,7 +24,14 @@ from glovecal_service.realtime.glove_lanes import GlovePipeline
 from glovecal_service.realtime.lane_effects import GloveContext, WornGloves
 from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas, Serving
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
-from glovecal_service.store.errors import DamagedRows, NotFound, StoreDamaged, StoreError, StoreUnavailable
+from glovecal_service.store.errors import (
+    Conflict,
+    DamagedRows,
+    NotFound,
+    StoreDamaged,
+    StoreError,
+    StoreUnavailable,
+)
 from glovecal_service.store.models import other_remedies
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
@@ -66,9 +73,9 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
 def _chosen(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Prepared) -> Serving:
     """As ``choose``; the hand as far as the glove or the model says it, and no skeleton."""
     try:
-        record = store.gloves.get(glove)
-    except NotFound:
-        return Serving(sentence=f"glove {glove} has not said yet which layout it has")
+        record = store.gloves.as_said(glove, meta)
+    except BadInput as error:
+        return Serving(sentence=str(error))
     subject, layout = record.subject, record.layout
     run_id = str((meta or {}).get("run_id") or "")
     hand = known_hand((meta or {}).get("hand"))
@@ -299,6 +306,8 @@ class ModelWatcher:
         self._revision: int | None = None
         self._gloves: set[str] = set()
         self._unnoted: set[str] = set()
+        self._not_stored: dict[str, str] = {}
+        """Why a glove whose frames came is not, where somebody has to know."""
         self._to_choose: set[str] = set()
         self._troubled_at: dict[str, float] = {}
         self._artifacts_at = 0.0
@@ -306,7 +315,7 @@ class ModelWatcher:
 
     def run(self, stopped: Event) -> None:
         """Until ``stopped``."""
-        self._unnoted |= self._metas.ask()
+        self._metas.ask()
         while not stopped.is_set():
             self.look()
             stopped.wait(LOOK_EVERY_S if not self.database_problem else 1.0)
@@ -316,7 +325,9 @@ class ModelWatcher:
     def look(self) -> None:
         """One look; problems end up in ``database_problem`` and in the gloves' sentences."""
         lanes = self._lanes()
-        self._unnoted |= self._metas.news(lanes)
+        changed = self._metas.news(lanes)
+        self._unnoted |= changed
+        self._to_choose |= {glove for glove in changed if not self._is_camera(glove)}
         heard = {lane.glove for lane in lanes if lane.gate.run_id is not None}  # not names with junk only
         self._forget([glove for glove in self._gloves - heard if self._metas.of(glove) is None])
         self._to_choose |= heard - self._gloves
@@ -334,6 +345,7 @@ class ModelWatcher:
         for glove in gloves:
             self._gloves.discard(glove)
             self._troubled_at.pop(glove, None)
+            self._not_stored.pop(glove, None)
             self._models.put(glove, None)
             self._pose_metas.forget(glove)
             self._worn.forget(glove)
@@ -345,11 +357,12 @@ class ModelWatcher:
         return self._store
 
     def _follow(self, store: Store) -> None:
-        for glove in sorted(self._unnoted):
+        for glove in sorted(filter(self._metas.is_proven, self._unnoted)):
             self._note(store, glove)
         revision = store.revision()
         if revision != self._revision:
             self._to_choose |= self._gloves
+            self._unnoted |= self._metas.proven() - store.gloves.names()
         late = time.monotonic() - TRY_AGAIN_AFTER_S
         self._to_choose |= {glove for glove, at in self._troubled_at.items() if at < late}
         self._look_at_artifacts(store)
@@ -367,13 +380,19 @@ class ModelWatcher:
             self._to_choose |= self._gloves
         self._damaged = damaged
 
+    def _is_camera(self, glove: str) -> bool:
+        """One says itself what its poses are."""
+        return (self._metas.of(glove) or {}).get("makes_poses") is True
+
     def _note(self, store: Store, glove: str) -> None:
+        """Store what a glove whose frames came says of itself."""
+        self._unnoted.discard(glove)
+        self._not_stored.pop(glove, None)
         try:
             store.gloves.seen(glove, self._metas.of(glove) or {})
-        except (BadInput, StoreDamaged) as error:
-            _log.warning("glove %s: its meta cannot be used: %s", glove, error)
-        self._unnoted.discard(glove)
-        if (self._metas.of(glove) or {}).get("makes_poses") is not True:  # a camera says itself what they are
+        except (BadInput, Conflict, StoreDamaged) as error:
+            _log.warning("glove %s is not stored: %s", glove, error)
+            self._not_stored[glove] = str(error) if isinstance(error, Conflict) else ""
             self._to_choose.add(glove)
 
     def _choose(self, store: Store, glove: str) -> None:
@@ -386,6 +405,8 @@ class ModelWatcher:
         except Exception:  # whatever is wrong with one wearer's model, the other gloves keep theirs
             _log.exception("glove %s: its model cannot be prepared", glove)
             serving = self._keep(glove, "the newer one fails here, the log of real time says where")
+        if not_stored := self._not_stored.get(glove):
+            serving = replace(serving, sentence="; ".join(filter(None, [serving.sentence, not_stored])))
         self._worn.put(glove, GloveContext.of(self._metas.of(glove), serving.wearing, serving.latency))
         self._serve(glove, serving)
         self._gloves.add(glove)

@@ -6,21 +6,27 @@ What the capture daemons say about their gloves: heard when they say it, asked f
 from __future__ import annotations
 
 import json
+import logging
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any
 
 import zenoh
 
+from glovecal_client.clock import clock_ns
 from glovecal_client.errors import BadName, NoAnswer
 from glovecal_client.keys import JSON_ENCODING, GloveKeys, all_gloves, parse_glove_key
-from glovecal_client.session import ask, json_object
+from glovecal_client.publishers import Publishers
+from glovecal_client.run_metas import RunMetas
+from glovecal_client.session import MAX_PUT_BYTES, ask, json_object
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.take import KnownLatency
-from glovecal_service.incoming.arrivals import Arrivals
-from glovecal_service.realtime.glove_lanes import GlovePipeline
+from glovecal_service.incoming.documents import Documents
+from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS
+from glovecal_service.realtime.glove_lanes import GLOVES_LIMIT, GlovePipeline
 from glovecal_service.realtime.served_model import ServedModel
 
 
@@ -105,20 +111,52 @@ class PoseMetas:
 ASK_EVERY_S = 2.0
 _ANSWER_WITHIN_S = 0.5
 _CHANGES_ALL_THE_TIME = ("log_from", "log_to")
+MOST_GLOVES = 2 * GLOVES_LIMIT
+
+_log = logging.getLogger("glovecal.realtime")
 
 
 class GloveMetas:
-    """The newest meta of each glove. For one thread."""
+    """What each glove's run says of itself. For one thread; ``warnings`` may be asked by others.
 
-    def __init__(self, session: zenoh.Session, site: str) -> None:
+    While a run's frames pass, the meta of that run is in force and no other; of a silent glove, that of the
+    run heard of last. Nothing is heard of a glove that has neither frames nor a liveliness token.
+    """
+
+    def __init__(self, session: zenoh.Session, site: str, publishers: Publishers) -> None:
         self._session = session
         self._site = site
-        self._arrivals = Arrivals(session, all_gloves(site, "meta"), limit=1024)
-        self._metas: dict[str, dict[str, Any]] = {}
+        self._publishers = publishers
+        self._documents = Documents(session, site, "meta")
+        self._lanes: dict[str, GlovePipeline] = {}
+        self._said: dict[str, RunMetas] = {}
+        self._in_force: dict[str, dict[str, Any]] = {}
         self._asked_at: dict[str, float] = {}
 
     def of(self, glove: str) -> dict[str, Any] | None:
-        return self._metas.get(glove)
+        """The meta in force."""
+        return self._in_force.get(glove)
+
+    def is_proven(self, glove: str) -> bool:
+        """Whether frames of the run whose meta is in force have passed; of a camera, whether it is there."""
+        meta = self._in_force.get(glove)
+        if meta is None:
+            return False
+        if meta.get("makes_poses") is True:
+            return self._publishers.has(glove)
+        return meta.get("run_id") == self._run_of(glove)
+
+    def proven(self) -> set[str]:
+        return set(filter(self.is_proven, self._in_force))
+
+    def warnings(self, glove: str) -> list[dict[str, str]]:
+        """That somebody else spoke for the run that is in force, as JSON."""
+        said = self._said.get(glove)
+        if said is None or not said.refused or said.contradicted != self._run_of(glove):
+            return []
+        times = "once" if said.refused == 1 else f"{said.refused} times"
+        sentence = f"{said.sentence[0].upper()}{said.sentence[1:]} ({times})."
+        return [{"part": "publisher", "sentence": sentence, "advice": _STOP_ONE}]
 
     def forget(self, glove: str) -> None:
         """No longer remember when it was asked."""
@@ -126,38 +164,65 @@ class GloveMetas:
 
     def news(self, lanes: Iterable[GlovePipeline]) -> set[str]:
         """Gloves whose meta changed since the last call; a glove that streams without one is asked for it."""
-        changed = {self._note(item.key, item.payload) for item in self._arrivals.drain()}
-        for lane in lanes:
-            if self._is_unknown(lane):
-                changed |= self.ask(lane.glove)
-        return changed - {""}
+        self._lanes = {lane.glove: lane for lane in lanes if lane.gate.run_id is not None}
+        for document in self._documents.take(self._is_there):
+            self._note(document.glove, document.content)
+        for glove in [glove for glove in self._lanes if self._is_unknown(glove)]:
+            self.ask(glove)
+        return {glove for glove in self._said if self._comes_into_force(glove)}
 
-    def ask(self, glove: str = "*") -> set[str]:
-        """Ask one glove, or all, for its meta; the gloves whose answer was news."""
+    def ask(self, glove: str = "*") -> None:
+        """Ask one glove, or all, for its meta."""
         self._asked_at[glove] = time.monotonic()
         key = all_gloves(self._site, "meta") if glove == "*" else GloveKeys(self._site, glove).meta
-        try:
-            answers = ask(self._session, key, timeout_s=_ANSWER_WITHIN_S)
-        except NoAnswer:
-            return set()
-        return {self._note(str(answer.key_expr), answer.payload.to_bytes()) for answer in answers} - {""}
+        with suppress(NoAnswer):
+            for answer in ask(self._session, key, timeout_s=_ANSWER_WITHIN_S):
+                payload = answer.payload.to_bytes()
+                meta = json_object(payload) if len(payload) <= MAX_PUT_BYTES else None
+                with suppress(BadName):
+                    self._note(parse_glove_key(str(answer.key_expr))[0].glove, meta or {})
 
-    def _is_unknown(self, lane: GlovePipeline) -> bool:
-        run_id = lane.gate.run_id
-        meta = self._metas.get(lane.glove)
-        known = run_id is None or (meta is not None and meta.get("run_id") == f"{run_id:016x}")
-        return not known and time.monotonic() - self._asked_at.get(lane.glove, -ASK_EVERY_S) >= ASK_EVERY_S
+    def _is_there(self, glove: str) -> bool:
+        return glove in self._lanes or self._publishers.has(glove)
 
-    def _note(self, key: str, payload: bytes) -> str:
-        meta = json_object(payload)
-        try:
-            keys, _ = parse_glove_key(key)
-        except BadName:
-            return ""
-        if meta is None or not _differs(meta, self._metas.get(keys.glove)):
-            return ""
-        self._metas[keys.glove] = meta
-        return keys.glove
+    def _run_of(self, glove: str) -> str:
+        lane = self._lanes.get(glove)
+        run_id = None if lane is None else lane.gate.run_id
+        return "" if run_id is None else f"{run_id:016x}"
+
+    def _is_unknown(self, glove: str) -> bool:
+        said = self._said.get(glove)
+        known = said is not None and said.of(self._run_of(glove)) is not None
+        return not known and time.monotonic() - self._asked_at.get(glove, -ASK_EVERY_S) >= ASK_EVERY_S
+
+    def _note(self, glove: str, meta: dict[str, Any]) -> None:
+        if not meta or (glove not in self._said and not self._has_room()):
+            return
+        said = self._said.setdefault(glove, RunMetas())
+        is_first = said.contradicted != meta.get("run_id")
+        if not said.note(meta, keep=self._run_of(glove)) and is_first:
+            _log.warning("glove %s: %s. %s", glove, said.sentence, _STOP_ONE)
+
+    def _has_room(self) -> bool:
+        if len(self._said) >= MOST_GLOVES:
+            for glove in [glove for glove in self._said if not self._is_there(glove)]:
+                del self._said[glove]
+                self._in_force.pop(glove, None)
+        return len(self._said) < MOST_GLOVES
+
+    def _comes_into_force(self, glove: str) -> bool:
+        """Put the meta in force that belongs to the glove now; whether that changes anything."""
+        said, lane = self._said[glove], self._lanes.get(glove)
+        meta = said.newest
+        if lane is not None and clock_ns() - lane.valid_ns <= TAKEOVER_AFTER_NS:
+            meta = said.of(self._run_of(glove))
+        if meta is None or not _differs(meta, self._in_force.get(glove)):
+            return False
+        self._in_force[glove] = meta
+        return True
+
+
+_STOP_ONE = "Stop the other publisher, or give it a --glove name of its own."
 
 
 def _differs(meta: dict[str, Any], earlier: dict[str, Any] | None) -> bool:

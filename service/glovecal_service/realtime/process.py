@@ -12,6 +12,7 @@ from threading import Event, Thread
 import zenoh
 
 from glovecal_client.keys import GloveKeys, all_gloves, service_alive_key
+from glovecal_client.publishers import Publishers
 from glovecal_client.session import open_router
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.worker_processes import pin_blas_to_one_thread
@@ -62,9 +63,11 @@ def _serve(
     worn = WornGloves()
     loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish, worn)
     pose_metas = PoseMetas(session, settings.site)
+    publishers = Publishers(session, all_gloves(settings.site, "alive"))
+    metas = GloveMetas(session, settings.site, publishers)
     watcher = ModelWatcher(
         lambda: Store.open(settings),
-        GloveMetas(session, settings.site),
+        metas,
         lambda: loop.lanes,
         models,
         pose_metas,
@@ -76,6 +79,8 @@ def _serve(
         instance,
         loop.gloves,
         pose_metas,
+        metas,
+        publishers,
         lambda: watcher.database_problem,
         settings.data,
     )

@@ -18,33 +18,56 @@ from typing import Any
 import zenoh
 
 from glovecal_client.clock import clock_ns, wall_ns
-from glovecal_client.errors import BadName
-from glovecal_client.keys import JSON_ENCODING, all_gloves, all_services, parse_glove_key, service_alive_key
+from glovecal_client.keys import JSON_ENCODING, all_services, service_alive_key
 from glovecal_client.plausible_loss import PlausibleLoss
-from glovecal_client.session import json_object
-from glovecal_service.incoming.arrivals import Arrival, Arrivals
+from glovecal_client.publishers import Publishers
+from glovecal_service.incoming.documents import Document, Documents
 from glovecal_service.incoming.frame_gate import Place, Standing
 from glovecal_service.realtime.glove_lanes import GLOVES_LIMIT, GlovePipelines
-from glovecal_service.realtime.pose_meta import PoseMetas
+from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas
 
 SETTLED_AFTER_NS = 500_000_000
 """Frames sent before a report are here by then, or lost."""
 _REPORTS = 8
+_RUNS = 4
 
 
 @dataclass
 class _Glove:
     first: Place
-    newest: deque[Place] = field(default_factory=lambda: deque(maxlen=_REPORTS))
+    of_runs: dict[int, deque[Place]] = field(default_factory=dict)
+    """The newest reports of each run, at most ``_RUNS``."""
+    heard: set[int] = field(default_factory=set)
+    """Runs whose frames came: reports on others make room."""
     ended: dict[int, int] = field(default_factory=dict)
     """Frames missing after the last one that came of runs that are over, by run."""
 
+    def note(self, report: Place) -> None:
+        if report.run_id not in self.of_runs and len(self.of_runs) >= _RUNS:
+            del self.of_runs[next(run for run in self.of_runs if run not in self.heard)]
+        self.of_runs.setdefault(report.run_id, deque(maxlen=_REPORTS)).append(report)
+
+    def newest_of_all(self, before_ns: int, standing: Standing | None) -> Place | None:
+        """The newest report from before ``before_ns`` that can be the glove's."""
+        reports = [
+            each
+            for run in self.of_runs.values()
+            for each in run
+            if each.at_ns < before_ns and _is_of(each, standing)
+        ]
+        return max(reports, key=lambda each: each.at_ns, default=None)
+
 
 class CaptureReports:
-    """The newest ``status`` of each glove's capture daemon; may be asked by any thread."""
+    """The newest ``status`` of each glove's capture daemon; may be asked by any thread.
 
-    def __init__(self, session: zenoh.Session, site: str) -> None:
-        self._arrivals = Arrivals(session, all_gloves(site, "status"), limit=1024)
+    A status without a liveliness token behind it is nobody's; one of another run than that whose frames come
+    is not the glove's.
+    """
+
+    def __init__(self, session: zenoh.Session, site: str, publishers: Publishers) -> None:
+        self._documents = Documents(session, site, "status")
+        self._publishers = publishers
         self._lock = Lock()
         self._gloves: dict[str, _Glove] = {}
 
@@ -54,13 +77,15 @@ class CaptureReports:
         ``received``: messages of the glove so far; None for ``standing``: not one valid frame among them.
         """
         with self._lock:
-            for arrival in self._arrivals.drain():
-                self._note(arrival)
+            self._take_in()
             known = self._gloves.get(glove)
             if known is None:
                 return 0
             before_ns = clock_ns() - SETTLED_AFTER_NS
-            settled = next((report for report in reversed(known.newest) if report.at_ns < before_ns), None)
+            if standing is not None:
+                ended = {standing.ended.run_id} if standing.ended is not None else set()
+                known.heard = {standing.newest.run_id} | ended
+            settled = known.newest_of_all(before_ns, standing)
             if standing is None:
                 return 0 if settled is None else _possible(settled.sequence, known.first, settled) - received
             missing = self._of_ended_runs(known, standing) + _before_the_first(known.first, standing)
@@ -68,26 +93,41 @@ class CaptureReports:
                 return missing
             return missing + max(0, _after(standing, settled) - (received - standing.messages))
 
-    def _note(self, arrival: Arrival) -> None:
-        document = json_object(arrival.payload) or {}
+    def gloves(self) -> set[str]:
+        """Of which a status is believed."""
+        with self._lock:
+            self._take_in()
+            return set(self._gloves)
+
+    def _take_in(self) -> None:
+        for document in self._documents.take(self._publishers.has):
+            self._note(document)
+
+    def _note(self, heard: Document) -> None:
+        glove, document = heard.glove, heard.content
         try:
-            glove = parse_glove_key(arrival.key)[0].glove
             sequence = document["sequence"]
             run_id, sequence = int(document["run_id"], 16), -1 if sequence is None else int(sequence)
             wall_ns = int(document.get("wall_ns") or 0)
-        except (BadName, KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             return
-        report = Place(run_id, sequence, arrival.received_ns, wall_ns)
+        report = Place(run_id, sequence, heard.received_ns, wall_ns)
         if glove in self._gloves or len(self._gloves) < 2 * GLOVES_LIMIT:
-            self._gloves.setdefault(glove, _Glove(report)).newest.append(report)
+            self._gloves.setdefault(glove, _Glove(report)).note(report)
 
     def _of_ended_runs(self, known: _Glove, standing: Standing) -> int:
         if (ended := standing.ended) is not None:
-            for report in known.newest:
-                if report.run_id == ended.run_id:
-                    missing = _possible(report.sequence, ended, report)
-                    known.ended[ended.run_id] = max(known.ended.get(ended.run_id, 0), missing)
+            for report in known.of_runs.get(ended.run_id, ()):
+                missing = _possible(report.sequence, ended, report)
+                known.ended[ended.run_id] = max(known.ended.get(ended.run_id, 0), missing)
         return sum(known.ended.values())
+
+
+def _is_of(report: Place, standing: Standing | None) -> bool:
+    """Of the run whose frames come, of the one before it, or said after the newest frame."""
+    if standing is None or report.run_id == standing.newest.run_id or report.at_ns > standing.newest.at_ns:
+        return True
+    return standing.ended is not None and report.run_id == standing.ended.run_id
 
 
 def _possible(sequence: int, since: Place, report: Place) -> int:
@@ -145,6 +185,8 @@ class ServiceStatus:
         instance: str,
         gloves: GlovePipelines,
         pose_metas: PoseMetas,
+        metas: GloveMetas,
+        publishers: Publishers,
         problem: Callable[[], str],
         data: Path,
     ) -> None:
@@ -152,10 +194,11 @@ class ServiceStatus:
         self._instance = instance
         self._gloves = gloves
         self._pose_metas = pose_metas
+        self._metas = metas
         self._problem = problem
         self._alive_file = data / ALIVE_FILE
         self._started_wall_ns = wall_ns()
-        self._reports = CaptureReports(session, site)
+        self._reports = CaptureReports(session, site, publishers)
         self._publisher = session.declare_publisher(self._key, encoding=JSON_ENCODING)
         self._queryable = session.declare_queryable(self._key, self._answer)
         self._be_seen()
@@ -175,6 +218,8 @@ class ServiceStatus:
         metas = self._pose_metas.documents()
         unheard = self._reports.unheard
         lanes = {lane.glove: lane.status(unheard) for lane in self._gloves.all()}
+        for glove, lane in lanes.items():
+            lane["warnings"] = [*self._metas.warnings(glove), *lane["warnings"]]
         gloves = {
             glove: {
                 **(lanes.get(glove) or _nothing_received(unheard(glove, None, 0))),
@@ -183,7 +228,7 @@ class ServiceStatus:
                     for name in ("state", "subject", "wearing", "layout", "sentence")
                 },
             }
-            for glove in sorted(lanes.keys() | metas.keys())
+            for glove in sorted(lanes.keys() | metas.keys() | self._reports.gloves())
         }
         return {
             "instance": self._instance,

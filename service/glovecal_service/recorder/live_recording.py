@@ -13,18 +13,23 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer, WireError
 from glovecal_client.keys import GloveKeys
+from glovecal_client.plausible_loss import PlausibleLoss
+from glovecal_client.publishers import Publishers
 from glovecal_client.session import json_object
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_service.incoming.arrivals import Arrivals
 from glovecal_service.incoming.frame_gate import TAKEOVER_AFTER_NS, Refusal, Refused, SequenceOrder
+from glovecal_service.recorder.log_comparison import reconcile_and_compare
 from glovecal_service.recorder.pre_roll import PreRoll, PreRollRequest
-from glovecal_service.recorder.reconciliation import CaptureLog, OutOfTime, Patience, fill_gaps, reconcile
+from glovecal_service.recorder.reconciliation import CaptureLog, OutOfTime, Patience, fill_gaps
 from glovecal_service.recorder.recording_result import Settlement, recording_account
 from glovecal_service.recorder.run_books import OWN_CLOCK
 from glovecal_service.recorder.run_ledger import RunLedger, decoded
 from glovecal_service.store.recordings import PRE_ROLL
 
 WAITING_LIMIT, STATUSES_LIMIT = 65536, 1024
+STATUSES_READ = 16
+"""Of those that wait at a look, the newest."""
 HELD_LIMIT = 1024
 """Frames with numbers that do not fit yet."""
 REPAIR_AFTER_S = 0.5
@@ -60,6 +65,7 @@ class LiveRecording:
         self._log = CaptureLog(session, keys)
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
         self._statuses = Arrivals(session, keys.status, limit=STATUSES_LIMIT)
+        self._publishers = Publishers(session, keys.alive)
         try:
             self.file = open_file()
         except BaseException:
@@ -71,21 +77,30 @@ class LiveRecording:
         """Write what arrived since the last call."""
         for arrival in self._arrivals.drain():
             self._record(arrival.payload, arrival.received_ns)
-        for arrival in self._statuses.drain():
-            self._note_status(json_object(arrival.payload) or {})
+        statuses = self._statuses.drain()[-STATUSES_READ:]
+        if statuses and self._publishers.has(self.keys.glove):
+            for arrival in statuses:
+                self._note_status(json_object(arrival.payload) or {}, arrival.received_ns)
 
-    def _note_status(self, status: dict[str, Any]) -> None:
-        """The last status of a run says how far it came; once capture is gone nobody can be asked."""
-        run_id, last, own = status.get("run_id"), status.get("sequence"), status.get(OWN_CLOCK)
-        for books in self.file.runs.values():
-            if f"{books.run_id:016x}" == run_id and isinstance(own, dict):
-                books.own_clock = own
+    def _note_status(self, status: dict[str, Any], received_ns: int) -> None:
+        """The last status of a run says how far it came; once capture is gone nobody can be asked.
+
+        One of another run than those recorded is not the glove's.
+        """
+        books = next(
+            (each for each in self.file.runs.values() if f"{each.run_id:016x}" == status.get("run_id")), None
+        )
+        if books is None:
+            return
+        last, own = status.get("sequence"), status.get(OWN_CLOCK)
+        if isinstance(own, dict):
+            books.own_clock = own
         if status.get("state") != "stopped" or not isinstance(last, int):
             return
-        for books in self.file.runs.values():
-            if f"{books.run_id:016x}" == run_id:
-                books.note_given(last)
-                books.ended = True
+        if PlausibleLoss(self._heard_ns).allows(max(0, last - books.last), received_ns):
+            books.note_given(last)
+            books.ended = True
+            self.file.note_reached(books.run_id, last)
 
     def take_pre_roll(self) -> None:
         """Write what was fetched of the pre-roll since the last call; never waits."""
@@ -189,7 +204,7 @@ class LiveRecording:
         if stop_wall_ns is not None and ahead_ns is not None:
             self._end_ns = stop_wall_ns + ahead_ns
         self._stop_listening()
-        outcome = reconcile(self.file, self._log, stop_wall_ns, patience)
+        outcome = reconcile_and_compare(self.file, self._log, stop_wall_ns, patience)
         self._finish_pre_roll(patience)
         self.file.close()
         return Settlement.of(self.file, outcome, refused=self.refused, why_shorter=self._why_shorter())
@@ -217,6 +232,7 @@ class LiveRecording:
     def _close_arrivals(self) -> None:
         self._arrivals.close()
         self._statuses.close()
+        self._publishers.close()
 
     def account(self) -> dict[str, Any]:
         """Facts for the recording's row while it goes on."""

@@ -16,7 +16,7 @@ import zenoh
 
 from glovecal_client.clock import wall_ns
 from glovecal_client.errors import NoAnswer, QueryRefused, WireError
-from glovecal_client.gap_repair import fetch_block
+from glovecal_client.gap_repair import BlockDigest, fetch_block, fetch_digest
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import ask_json
 from glovecal_client.wire.frame import Frame, encode_frame
@@ -84,6 +84,13 @@ class CaptureLog:
         """
         return fetch_block(self._session, self._keys, run_id, first, last, timeout_s=ANSWER_WITHIN_S)
 
+    def digest(self, run_id: int, first: int, last: int) -> BlockDigest | None:
+        """Of the frames that ``block`` would bring; None: the log has none of them.
+
+        Raises as ``block``; QueryRefused also by a capture that gives no digests.
+        """
+        return fetch_digest(self._session, self._keys, run_id, first, last, timeout_s=ANSWER_WITHIN_S)
+
 
 END_OF_RUN = (1 << 63) - 1
 TRY_AGAIN_AFTER_S = 0.1
@@ -100,6 +107,8 @@ class Log(Protocol):
 
     def block(self, run_id: int, first: int, last: int) -> list[Frame]: ...
 
+    def digest(self, run_id: int, first: int, last: int) -> BlockDigest | None: ...
+
 
 class OutOfTime(Exception):
     """The capture log answers, but has more frames to give than could be fetched so far."""
@@ -112,6 +121,10 @@ class Outcome:
     complete: bool
     why: str = ""
     """A clause: why it is not complete; or, where it is, what the capture log could not tell."""
+    not_compared: str = ""
+    """A clause: why what is recorded was not compared with the capture log; "" where it was."""
+    may_be_compared: bool = False
+    """Whether that is worth another try."""
 
 
 class Patience:
@@ -165,6 +178,7 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
     if end_ns is not None:
         _open_runs_of(file, standing, end_ns)
     file.note_capture(standing.meta)
+    file.note_reached(standing.runs[-1].run_id, standing.sequence)
     refused = None
     for books in list(file.runs.values()):
         try:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +25,11 @@ from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.live_recording import LiveRecording
+from glovecal_service.recorder.log_comparison import reconcile_and_compare
 from glovecal_service.recorder.pre_roll import pre_roll_request
-from glovecal_service.recorder.reconciliation import CaptureLog, Patience, reconcile
+from glovecal_service.recorder.reconciliation import CaptureLog, Patience
 from glovecal_service.recorder.recording_result import Settlement, keep_as_take
-from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, SUFFIX, RunLedger
+from glovecal_service.recorder.run_ledger import BEGIN, CAPTURE, CREATED, FINDINGS, SUFFIX, RunLedger
 from glovecal_service.recorder.sampling_runner import SamplingRunner
 from glovecal_service.settings import Settings
 from glovecal_service.store.database import now
@@ -185,13 +186,14 @@ class Recorder:
                 path,
                 CaptureLog(self._session, self._keys(record)),
                 _stop_wall_ns(record, NOTICED_AFTER_S),
-                refused=record.facts.get("refused", 0),
+                account=record.facts,
                 patience=Patience(FINISH_WITHIN_S, self._stopping),
             )
             return
 
         def file() -> RunLedger:
-            return RunLedger.resume(path) if interrupted else self._create(store, record, path)
+            known = record.facts.get(FINDINGS)
+            return RunLedger.resume(path, known) if interrupted else self._create(store, record, path)
 
         live = self._live[record.id] = LiveRecording(self._session, self._keys(record), file)
         facts = {}
@@ -247,7 +249,7 @@ class Recorder:
                 self._path(record),
                 CaptureLog(self._session, self._keys(record)),
                 _stop_wall_ns(record, NOTICED_AFTER_S),
-                refused=record.facts.get("refused", 0),
+                account=record.facts,
                 stopped=self._stopping,
                 last_try=(now() - record.requested_at).total_seconds() > GIVE_UP_AFTER_S,
             )
@@ -267,7 +269,7 @@ class Recorder:
         if settlement is not None and not self._keep(store, record, settlement):
             return
         del self._settling[record.id]
-        if settlement is None or not settlement.outcome.complete:
+        if settlement is None or not settlement.is_final:
             self._pauses[record.id] = self._pauses.get(record.id, Pause()).longer()
         else:
             self._pauses.pop(record.id, None)
@@ -283,7 +285,7 @@ class Recorder:
             raise
         if facts["sentence"] != record.facts.get("sentence"):
             _log.info("recording %s: %s", record.name, facts["sentence"])
-        state = "done" if settlement.outcome.complete else "repairing"
+        state = "done" if settlement.is_final else "repairing"
         store.recordings.update(record.id, state=state, **facts)
         return True
 
@@ -345,13 +347,13 @@ def repair(
     log: CaptureLog,
     stop_wall_ns: int | None,
     *,
-    refused: int,
+    account: Mapping[str, Any],
     stopped: Event,
     last_try: bool,
 ) -> Settlement | None:
     """One attempt; None while capture does not answer. Raises DamagedLog, OSError.
 
-    ``refused`` is what was counted while it was recorded; the rest is as in ``reconcile``. What the
+    ``account`` is what is known of it; the rest is as in ``reconcile``. What the
     ``last_try`` does not bring is missing.
     """
     try:
@@ -359,7 +361,7 @@ def repair(
     except NoAnswer:
         if not last_try:
             return None
-    found = settle(path, log, stop_wall_ns, refused=refused, patience=Patience(REPAIR_WITHIN_S, stopped))
+    found = settle(path, log, stop_wall_ns, account=account, patience=Patience(REPAIR_WITHIN_S, stopped))
     return found.given_up() if last_try else found
 
 
@@ -368,16 +370,16 @@ def settle(
     log: CaptureLog,
     stop_wall_ns: int | None,
     *,
-    refused: int,
+    account: Mapping[str, Any],
     patience: Patience,
 ) -> Settlement:
-    """The account of a closed file, repaired as far as ``patience`` allows."""
-    file = RunLedger.resume(path)
+    """The account of a closed file, repaired as far as ``patience`` allows; ``account``: what is known."""
+    file = RunLedger.resume(path, account.get(FINDINGS))
     try:
-        outcome = reconcile(file, log, stop_wall_ns, patience)
+        outcome = reconcile_and_compare(file, log, stop_wall_ns, patience)
     finally:
         file.close()
-    return Settlement.of(file, outcome, refused=refused)
+    return Settlement.of(file, outcome, refused=account.get("refused", 0))
 
 
 STOP_WITHIN_S = 5.0

@@ -20,8 +20,16 @@ from glovecal_models.hand.rotations import Handedness, known_hand
 from glovecal_models.takes.take import Take
 from glovecal_service.recorder.pre_roll import PreRollRequest
 from glovecal_service.recorder.reconciliation import Outcome
-from glovecal_service.recorder.run_books import OWN_CLOCK
-from glovecal_service.recorder.run_ledger import CAPTURE, SUFFIX, RunLedger
+from glovecal_service.recorder.run_books import OWN_CLOCK, SequenceRanges
+from glovecal_service.recorder.run_ledger import (
+    CAPTURE,
+    FINDINGS,
+    SUFFIX,
+    TAKEN_OUT,
+    RunLedger,
+    frames_taken_out,
+    usable_frames,
+)
 from glovecal_service.recorder.trigger_times import trigger_facts
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.recordings import ENDED_BY, PRE_ROLL
@@ -36,18 +44,25 @@ class Settlement:
     account: dict[str, Any]
     outcome: Outcome
 
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing can come or be found out any more."""
+        return self.outcome.complete and not self.outcome.may_be_compared
+
     @classmethod
     def of(cls, file: RunLedger, outcome: Outcome, **told: Any) -> Settlement:
         """Of a file that was closed; ``told`` is as in ``recording_account``."""
         if file.lost_records:
             outcome = Outcome(False, "the disk is full")
-        return cls(recording_account(file, complete=outcome.complete, **told), outcome)
+        account = recording_account(file, complete=outcome.complete, **told)
+        return cls({**account, "compared": outcome.complete and not outcome.not_compared}, outcome)
 
     def given_up(self) -> Settlement:
         """What is pending is missing."""
         missing = {"missing": self.account["pending"], "missing_frames": self.account["pending_frames"]}
         account = self.account | missing | {"complete": True, "pending": [], "pending_frames": 0}
-        return Settlement(account, Outcome(True, self.outcome.why))
+        why = self.outcome.not_compared or self.outcome.why
+        return Settlement(account, Outcome(True, self.outcome.why, not_compared=why))
 
 
 def recording_account(
@@ -56,8 +71,9 @@ def recording_account(
     """Facts for the recording's row; ``sent`` = ``recorded`` + ``missing_frames`` + ``pending_frames``.
 
     ``missing`` are ranges that no log has, known once the account is ``complete``; until then what is not
-    recorded is ``pending``: it may still be fetched. The pre-roll is counted apart, and nothing of it is ever
-    missing; ``why_shorter`` is a clause on why it is shorter than asked for.
+    recorded is ``pending``: it may still be fetched. ``taken_out``: frames that came and were not the
+    capture's, by its log; they count as nothing else. The pre-roll is counted apart, and nothing of it is
+    ever missing; ``why_shorter`` is a clause on why it is shorter than asked for.
     """
     wish = PreRollRequest.of_document(file.meta.get(PRE_ROLL))
     if why_shorter is None:
@@ -78,6 +94,8 @@ def recording_account(
         "pending": [] if complete else gaps,
         "pending_frames": 0 if complete else frames,
         "refused": refused,
+        TAKEN_OUT: sum(map(len, file.taken_out.values())),
+        FINDINGS: file.findings(),
         PRE_ROLL: wish.account(len(file.pre_roll), file.pre_roll_s, why_shorter),
         "runs": runs,
         "file": file.path.name,
@@ -115,6 +133,7 @@ def keep_as_take(
         wearing=record.wearing or "",
         first_sequence=account["first_sequence"],
         capture=record.facts.get(CAPTURE) or glove.meta,
+        taken_out=frames_taken_out(account[FINDINGS]),
     )
     take = _stored_before(store, subject, record)
     accounting = {**account, **recorded.clock, OWN_CLOCK: _own_clock(account, take)}
@@ -176,8 +195,15 @@ def _sentence(record: RecordingRecord, settlement: Settlement) -> str:
         return f"incomplete, repairing: {counts}, {pending}; {why}"
     told = [f"{counts}, {account['missing_frames']} missing"]
     told += [f"the capture log cannot tell of all: {why}"] if why else []
+    out, doubt = account[TAKEN_OUT], settlement.outcome.not_compared
+    told += [f"{out} frames were not the capture's and were taken out"] if out else []
+    told += [f"not compared with the capture log{_yet(settlement)}: {doubt}"] if doubt else []
     told += [record.facts[ENDED_BY]] if ENDED_BY in record.facts else []
     return "; ".join(told)
+
+
+def _yet(settlement: Settlement) -> str:
+    return " yet" if settlement.outcome.may_be_compared else ""
 
 
 # A finished recording file as a take.
@@ -195,17 +221,24 @@ class RecordedTake:
 
 
 def read_take(
-    path: Path, *, name: str, wearing: str, first_sequence: int = 0, capture: Mapping[str, Any] | None = None
+    path: Path,
+    *,
+    name: str,
+    wearing: str,
+    first_sequence: int = 0,
+    capture: Mapping[str, Any] | None = None,
+    taken_out: Mapping[int, SequenceRanges] | None = None,
 ) -> RecordedTake:
     """The frames of all runs in order; ``time_s`` is the capture computer's monotonic clock in seconds.
 
     Fetched frames of the first run with numbers below ``first_sequence`` are the pre-roll. ``capture``: what
-    it said of itself, where the file's header does not have it.
+    it said of itself, where the file's header does not have it; ``taken_out``: by run, the numbers of frames
+    that were not the capture's.
     Frames whose time does not increase, or with another number of sensors, are left out and counted.
     Raises BadInput if nothing usable remains, DamagedLog, OSError.
     """
     recording = Recording.open(path)
-    frames = _in_order(list(recording.frames()))
+    frames = _in_order(list(usable_frames(recording, taken_out or {})))
     meta = recording.meta.get(CAPTURE) or capture or {}
     sensors = tuple(str(sensor) for sensor in meta.get("sensors") or ())
     if not sensors:

@@ -11,7 +11,7 @@ never sent.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -29,6 +29,16 @@ class SequenceRanges:
         self._count = 0
         for number in numbers:
             self.add(number)
+
+    @classmethod
+    def of(cls, ranges: Iterable[Sequence[int]]) -> SequenceRanges:
+        """Disjoint ranges in order, each with both ends."""
+        made = cls()
+        for first, last in ranges:
+            made._firsts.append(first)
+            made._lasts.append(last)
+            made._count += last - first + 1
+        return made
 
     def __len__(self) -> int:
         return self._count
@@ -156,6 +166,8 @@ class RunBooks:
         """Of the newest frame recorded."""
         self.ended = False
         """Capture said that the run is over, and what its last number was."""
+        self.given = -1
+        """The highest number that capture said it gave."""
         self.own_clock: dict[str, Any] | None = None
         """How the glove's own clock stood against the computer's, as capture said last."""
         self._since_wall_ns = since_wall_ns
@@ -171,6 +183,7 @@ class RunBooks:
 
     def note_given(self, sequence: int) -> None:
         """Capture said that it gave this number."""
+        self.given = max(self.given, sequence)
         newest = self.stretches[-1]
         newest.last = max(newest.last, sequence)
 
@@ -264,6 +277,12 @@ class RunBooks:
             if part.reaches(later.first, later.first_ns):
                 part.join(later)
                 del self.stretches[at + 1]
+
+    def take_over(self, before: RunBooks) -> None:
+        """What capture said while these books were kept ``before``."""
+        self.ended, self.own_clock = before.ended, before.own_clock
+        if before.given >= 0:
+            self.note_given(before.given)
 
     def count_again(self) -> None:
         """Nothing is recorded any more: every frame is entered anew."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from array import array
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any
 
+import numpy as np
+
 from glovecal_client.errors import WireError
 from glovecal_client.frame_log import FrameLog, Recording
-from glovecal_client.wire.frame import Frame, decode_frame
+from glovecal_client.gap_repair import as_logged
+from glovecal_client.wire.frame import Frame, decode_frame, frame_run_id, frame_sequence
 from glovecal_service.recorder.run_books import RunBooks, SequenceRanges
 from glovecal_service.store.recordings import with_pre_roll
 
@@ -21,21 +25,31 @@ the recording begins with the first frame that came."""
 CAPTURE = "capture"
 """Of the header, and of a recording's facts where capture said it only later: its meta."""
 CREATED = "created_wall_ns"
+FINDINGS = "findings"
+"""Of a recording's facts: what comparing it with its capture log brought, by run."""
+TAKEN_OUT, REACHED = "taken_out", "reached"
+"""Of a run's findings."""
 LEFT_FREE_BYTES = 256 << 20
 """Of the disk, for frames that were asked for: hours of one glove."""
 
 
 class RunLedger:
-    """A frame log in ``recordings/``; every frame is written once, in the order it came."""
+    """A frame log in ``recordings/``; every frame is written once, in the order it came.
 
-    def __init__(self, log: FrameLog) -> None:
+    What turns out not to be the capture's stays in the file and leaves the books.
+    """
+
+    def __init__(self, log: FrameLog, known: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+        """``known``: what was found out before, as ``findings`` has it."""
         self._log = log
+        self.taken_out = frames_taken_out(known or {})
+        """By run: numbers whose frame, as it came over the wire, was not the capture's."""
+        self.reached = {int(run, 16): int(of[REACHED]) for run, of in (known or {}).items() if REACHED in of}
+        """By run: the last number that capture gave until its end, or until after the recording's; where it
+        said so."""
         self.runs: dict[int, RunBooks] = {}
         """In the order they began."""
-        begin = log.meta.get(BEGIN)
-        if begin is not None:
-            run_id, wall_ns = int(begin["run_id"], 16), int(begin["wall_ns"])
-            self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1, wall_ns, since_wall_ns=wall_ns)
+        self._open_first_run()
         self.capture: dict[str, Any] = dict(log.meta.get(CAPTURE) or {})
         """What capture said of itself and its glove; empty until it did."""
         self.created_wall_ns = int(log.meta.get(CREATED) or 0)
@@ -55,15 +69,66 @@ class RunLedger:
         return cls(FrameLog.create(path, meta))
 
     @classmethod
-    def resume(cls, path: Path) -> RunLedger:
+    def resume(cls, path: Path, known: Mapping[str, Mapping[str, Any]] | None = None) -> RunLedger:
         """A file that was left when its process was killed, cut back to its last whole record.
 
-        Raises DamagedLog, OSError.
+        ``known`` is as above. Raises DamagedLog, OSError.
         """
-        file = cls(FrameLog.resume(path))
-        for frame in Recording.open(path).frames():
-            file._enter(frame)
+        file = cls(FrameLog.resume(path), known)
+        file._enter_all()
         return file
+
+    def _open_first_run(self) -> None:
+        begin = self._log.meta.get(BEGIN)
+        if begin is not None:
+            run_id, wall_ns = int(begin["run_id"], 16), int(begin["wall_ns"])
+            self.runs[run_id] = RunBooks(run_id, begin["sequence"] + 1, wall_ns, since_wall_ns=wall_ns)
+
+    def _enter_all(self) -> None:
+        for frame in usable_frames(Recording.open(self.path), self.taken_out):
+            self._enter(frame)
+
+    def take_out(self, run_id: int, sequences: Iterable[int]) -> None:
+        """Note that the frames of these numbers that came over the wire are not the capture's, and make the
+        books anew from all others."""
+        known = self.taken_out.setdefault(run_id, SequenceRanges())
+        for sequence in sequences:
+            known.add(sequence)
+        before, self.runs = self.runs, {}
+        self._open_first_run()
+        self.first_frame = self.oldest_frame = None
+        self.pre_roll, self.last_wall_ns = SequenceRanges(), 0
+        self._enter_all()
+        for run_id, books in self.runs.items():
+            if run_id in before:
+                books.take_over(before[run_id])
+
+    def note_reached(self, run_id: int, sequence: int) -> None:
+        """Capture says so, at the run's end or after the recording's."""
+        self.reached[run_id] = max(sequence, self.reached.get(run_id, -1))
+
+    def findings(self) -> dict[str, dict[str, Any]]:
+        """By run, 16 hexadecimal digits: what is to be known when the file is resumed, or read."""
+        found: dict[str, dict[str, Any]] = {}
+        for run_id, out in self.taken_out.items():
+            if not out:
+                continue
+            found.setdefault(f"{run_id:016x}", {})[TAKEN_OUT] = [list(gap) for gap in out]
+        for run_id, sequence in self.reached.items():
+            found.setdefault(f"{run_id:016x}", {})[REACHED] = sequence
+        return found
+
+    def recorded(self) -> dict[int, RecordedFrames]:
+        """The frames in the file by run, without those that were taken out."""
+        found: dict[int, tuple[array[int], array[int], array[int]]] = {}
+        for place, message in Recording.open(self.path).places():
+            run_id, sequence = frame_run_id(message), frame_sequence(message)
+            out = self.taken_out.get(run_id)
+            if out is None or sequence not in out or as_logged(message) is not message:
+                columns = found.setdefault(run_id, (array("Q"), array("Q"), array("Q")))
+                for column, value in zip(columns, (sequence, place, len(message)), strict=True):
+                    column.append(value)
+        return {run_id: RecordedFrames(self.path, *columns) for run_id, columns in found.items()}
 
     @property
     def path(self) -> Path:
@@ -190,8 +255,42 @@ class RunLedger:
         self.pre_roll, self.oldest_frame = SequenceRanges(), self.first_frame
         for run in self.runs.values():
             run.count_again()
-        for frame in Recording.open(self.path).frames():
-            self._enter(frame)
+        self._enter_all()
+
+
+def frames_taken_out(findings: Mapping[str, Mapping[str, Any]]) -> dict[int, SequenceRanges]:
+    """By run."""
+    return {int(run, 16): SequenceRanges.of(found.get(TAKEN_OUT, ())) for run, found in findings.items()}
+
+
+def usable_frames(recording: Recording, taken_out: Mapping[int, SequenceRanges]) -> Iterator[Frame]:
+    """The frames in the order they were written, without those that were taken out; fetched ones stay."""
+    for frame in recording.frames():
+        if frame.repaired or frame.sequence not in taken_out.get(frame.run_id, ()):
+            yield frame
+
+
+class RecordedFrames:
+    """Of one run, by sequence number; of several of one number the first in the file."""
+
+    def __init__(self, path: Path, sequences: array[int], places: array[int], lengths: array[int]) -> None:
+        self._path = path
+        self.sequences, first = np.unique(np.array(sequences, np.uint64), return_index=True)
+        """Increasing, shape (N,)."""
+        self._places = np.array(places, np.uint64)[first]
+        self._lengths = np.array(lengths, np.uint64)[first]
+
+    def __len__(self) -> int:
+        return len(self.sequences)
+
+    def messages(self, rows: slice) -> list[bytes]:
+        """As they lie in the capture log, if they are from there. Raises OSError."""
+        found = []
+        with self._path.open("rb") as file:
+            for place, length in zip(self._places[rows].tolist(), self._lengths[rows].tolist(), strict=True):
+                file.seek(place)
+                found.append(as_logged(file.read(length)))
+        return found
 
 
 def _earlier(frame: Frame, other: Frame | None) -> Frame:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select, update
+from sqlalchemy import Connection, Row, delete, func, insert, select, update
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, subject_name
 from glovecal_models.takes.take import KnownLatency
 from glovecal_service.store import tables
 from glovecal_service.store.database import Database, grow_revision, now
-from glovecal_service.store.errors import NotFound
-from glovecal_service.store.records import GloveRecord, TakeRecord
+from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.records import OPEN_RECORDING_STATES, GloveRecord, TakeRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
+MOST_GLOVES = 256
+MOST_META_BYTES = 65_536
+"""As much as the router lets through at once."""
 _WEARER = ("layout", "subject", "wearing", "hand")
 
 
@@ -31,14 +35,14 @@ class Gloves:
 
         The later word on who wears the glove counts: a wearer chosen with ``assign`` stays through the run
         of the daemon in which it was chosen; the subject in the meta of a later run replaces it. The subject
-        may be one the store does not know yet. Raises BadInput for a meta that cannot be one.
+        may be one the store does not know yet. Raises BadInput for a meta that cannot be one, Conflict where
+        ``MOST_GLOVES`` are stored already.
         """
         said = _said(check_identifier(glove, "glove"), meta)
         with self._database.write() as connection:
             earlier = _find(connection, glove)
             if earlier is None:
-                values = {**said, "name": glove, "first_seen_at": said["last_seen_at"]}
-                connection.execute(insert(tables.gloves).values(**values))
+                _add(connection, {**said, "name": glove, "first_seen_at": said["last_seen_at"]})
                 grow_revision(connection)
             else:
                 _keep_chosen_wearer(said, earlier)
@@ -46,6 +50,39 @@ class Gloves:
                 if any(said[name] != getattr(earlier, name) for name in _WEARER):
                     grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
+
+    def as_said(self, glove: str, meta: Mapping[str, Any] | None) -> GloveRecord:
+        """The glove as ``seen`` would leave it, but nothing is stored; without a meta as it is. Raises
+        BadInput."""
+        said = _said(check_identifier(glove, "glove"), meta) if meta else {}
+        with self._database.read() as connection:
+            earlier = _find(connection, glove)
+            stored = {} if earlier is None else sound_row(tables.gloves, earlier)
+        if said and earlier is not None:
+            _keep_chosen_wearer(said, earlier)
+        nothing = dict.fromkeys(("layout", "subject", "wearing", "assigned_at", "latency"))
+        return _record({**nothing, **_unseen(glove, now()), **stored, **said})
+
+    def remove(self, name: str) -> None:
+        """Forget the glove and who wears it; its takes and recordings stay. Raises NotFound, Conflict while
+        a recording of it is not settled."""
+        table = tables.recordings
+        unsettled = (table.c.glove == name) & table.c.state.in_((*OPEN_RECORDING_STATES, "repairing"))
+        with self._database.write() as connection:
+            _require(connection, name)
+            recording = connection.execute(select(table.c.name, table.c.state).where(unsettled)).first()
+            if recording is not None:
+                raise Conflict(
+                    f"recording {recording.name!r} of glove {name!r} is {recording.state}; remove the glove "
+                    "once that is done"
+                )
+            connection.execute(delete(tables.gloves).where(tables.gloves.c.name == name))
+            grow_revision(connection)
+
+    def names(self) -> set[str]:
+        """Of all gloves."""
+        with self._database.read() as connection:
+            return set(connection.scalars(select(tables.gloves.c.name)))
 
     def get(self, name: str) -> GloveRecord:
         """Raises NotFound."""
@@ -61,7 +98,8 @@ class Gloves:
     def assign(self, glove: str, subject: str | None, wearing: str | None = None) -> GloveRecord:
         """Say who wears the glove from now on; None for nobody. The glove need not have been seen yet.
 
-        Raises BadInput for bad names, NotFound for an unknown subject.
+        Raises BadInput for bad names, NotFound for an unknown subject, Conflict where ``MOST_GLOVES`` are
+        stored already.
         """
         check_identifier(glove, "glove")
         if wearing is not None:
@@ -71,7 +109,7 @@ class Gloves:
                 require_subject(connection, subject)
             earlier, at = _find(connection, glove), now()
             if earlier is None:
-                connection.execute(insert(tables.gloves).values(**_unseen(glove, at)))
+                _add(connection, _unseen(glove, at))
             chosen = {
                 "subject": subject,
                 "wearing": wearing,
@@ -84,11 +122,12 @@ class Gloves:
 
     def set_latency(self, glove: str, latency: Mapping[str, Any] | None) -> GloveRecord:
         """Keep how late the glove was measured to be, ``latency_s`` and ``sd_s`` in seconds and what else is
-        to be known of it; None forgets it. The glove need not have been seen yet. Raises BadInput."""
+        to be known of it; None forgets it. The glove need not have been seen yet. Raises BadInput,
+        Conflict where ``MOST_GLOVES`` are stored already."""
         check_identifier(glove, "glove")
         with self._database.write() as connection:
             if _find(connection, glove) is None:
-                connection.execute(insert(tables.gloves).values(**_unseen(glove, now())))
+                _add(connection, _unseen(glove, now()))
             _change(connection, glove, {"latency": None if latency is None else dict(latency)})
             grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
@@ -110,6 +149,9 @@ def latency_of_take(connection: Connection, take: TakeRecord) -> KnownLatency | 
 
 
 def _said(glove: str, meta: Mapping[str, Any]) -> dict[str, Any]:
+    size = len(json.dumps(dict(meta), default=str))
+    if size > MOST_META_BYTES:
+        raise BadInput(f"meta of glove {glove!r}: {size} bytes; at most {MOST_META_BYTES} are kept")
     layout, subject, wearing = meta.get("layout"), meta.get("subject"), meta.get("wearing")
     run_id = meta.get("run_id")
     if layout is not None:
@@ -155,6 +197,16 @@ def _unseen(glove: str, at: datetime) -> dict[str, Any]:
         "first_seen_at": at,
         "last_seen_at": at,
     }
+
+
+def _add(connection: Connection, values: Mapping[str, Any]) -> None:
+    count = connection.scalar(select(func.count()).select_from(tables.gloves)) or 0
+    if count >= MOST_GLOVES:
+        raise Conflict(
+            f"{MOST_GLOVES} gloves are stored, no more can be; remove one that is not needed: "
+            "glovecal glove remove NAME"
+        )
+    connection.execute(insert(tables.gloves).values(**values))
 
 
 def _change(connection: Connection, glove: str, values: Mapping[str, Any]) -> None:

@@ -17,6 +17,8 @@ import zenoh
 from glovecal_client.errors import BadName, NoAnswer, QueryRefused, WireError
 from glovecal_client.keys import GloveKeys, all_gloves, all_services, check_channel_name, parse_glove_key
 from glovecal_client.pose_subscriber import PoseSubscriber
+from glovecal_client.publishers import Publishers
+from glovecal_client.run_metas import RUNS_KEPT, RunMetas
 from glovecal_client.session import ask_json, json_object, open_client
 from glovecal_client.wire.frame import decode_frame
 from glovecal_client.wire.pose import Pose
@@ -39,7 +41,7 @@ class GloveFeed:
         self.glove = glove
         self._poses = PoseSubscriber(session, site, glove)
         self._raw: bytes | None = None
-        self._meta: dict[str, Any] = {}
+        self._metas = RunMetas()
         hear = zenoh.handlers.Callback
         self._subscribers = [
             session.declare_subscriber(keys.raw, hear(self._hear_raw, indirect=False)),
@@ -59,7 +61,7 @@ class GloveFeed:
 
     @property
     def sensors(self) -> list[str]:
-        names = self._meta.get("sensors")
+        names = self._meta().get("sensors")
         return [str(name) for name in names] if isinstance(names, list) else []
 
     def names(self, pose: Pose) -> dict[str, Any]:
@@ -93,11 +95,21 @@ class GloveFeed:
         self._raw = sample.payload.to_bytes()
 
     def _hear_meta_reply(self, reply: zenoh.Reply) -> None:
-        if reply.ok is not None and not self._meta:
+        if reply.ok is not None:
             self._hear_meta(reply.ok)
 
     def _hear_meta(self, sample: zenoh.Sample) -> None:
-        self._meta = json_object(sample.payload.to_bytes()) or self._meta
+        if meta := json_object(sample.payload.to_bytes()):
+            self._metas.note(meta, keep=self._run)
+
+    def _meta(self) -> dict[str, Any]:
+        """Of the run whose poses come, or of the only one that was heard of."""
+        return self._metas.of(self._run) or self._metas.newest or {}
+
+    @property
+    def _run(self) -> str:
+        pose = self._poses.latest
+        return "" if pose is None else f"{pose.run_id:016x}"
 
 
 class LiveFeeds:
@@ -114,7 +126,11 @@ class LiveFeeds:
         self._kept = ExitStack()
         self._session: zenoh.Session | None = None
         self._feeds: dict[str, tuple[GloveFeed, int]] = {}
+        self._heard: dict[str, dict[str, tuple[float, dict[str, Any]]]] = {}
+        """The newest status of each run by glove, with the time: whoever said it."""
         self._statuses: dict[str, tuple[float, dict[str, Any]]] = {}
+        """Of these, those to believe."""
+        self._publishers: Publishers | None = None
         self._accounts: tuple[float, Mapping[str, Any]] = (-LOST_AFTER_S, {})
 
     def open(self, glove: str) -> GloveFeed:
@@ -138,8 +154,12 @@ class LiveFeeds:
         feed.close()
 
     def states(self) -> dict[str, GloveState]:
-        """Each glove that a capture daemon was heard of, by name. Raises NoAnswer without a router."""
+        """Each glove that a capture daemon was heard of, by name. Raises NoAnswer without a router.
+
+        A status counts while the glove has its liveliness token, and of several runs that whose frames come.
+        """
         self._connected()
+        self._believe()
         now, states = time.monotonic(), {}
         said, accounts = self._accounts
         for glove, (heard, status) in sorted(self._statuses.copy().items()):
@@ -150,6 +170,17 @@ class LiveFeeds:
                 feed is not None and feed.is_stale, account if isinstance(account, dict) else None,
             )  # fmt: skip
         return states
+
+    def _believe(self) -> None:
+        for glove, runs in self._heard.copy().items():
+            if self._publishers is not None and self._publishers.has(glove):
+                newest = max(runs.copy().values(), key=lambda said: said[0])
+                self._statuses[glove] = runs.get(self._run_of(glove), newest)
+
+    def _run_of(self, glove: str) -> str:
+        """Whose frames come, as the service says."""
+        account = self._accounts[1].get(glove)
+        return str(account.get("run_id")) if isinstance(account, dict) else ""
 
     def explain(self, glove: str, rotation: str) -> dict[str, Any]:
         """What one angle of the glove's next pose is made of, as ``pose/explain`` answers.
@@ -184,6 +215,8 @@ class LiveFeeds:
         session = self._kept.enter_context(open_client((self._settings.zenoh,), wait_s=ROUTER_WITHIN_S))
         site, hear = self._settings.site, zenoh.handlers.Callback
         service = all_services(site).removesuffix("alive") + "status"
+        self._publishers = Publishers(session, all_gloves(site, "alive"))
+        self._kept.callback(self._publishers.close)
         answered: list[threading.Event] = []
         for key, listen in ((all_gloves(site, "status"), self._hear_status), (service, self._hear_account)):
             self._kept.callback(session.declare_subscriber(key, hear(listen, indirect=False)).undeclare)
@@ -204,8 +237,19 @@ class LiveFeeds:
             return
         with suppress(BadName):
             glove = parse_glove_key(str(sample.key_expr))[0].glove
-            if glove in self._statuses or len(self._statuses) < MOST_GLOVES:
-                self._statuses[glove] = time.monotonic(), status
+            if glove in self._heard or self._has_room():
+                runs = self._heard.setdefault(glove, {})
+                run_id = str(status.get("run_id"))[:32]
+                if run_id not in runs and len(runs) >= RUNS_KEPT:
+                    del runs[next(run for run in runs if run != self._run_of(glove))]
+                runs[run_id] = time.monotonic(), status
+
+    def _has_room(self) -> bool:
+        """Gloves that nobody publishes make room."""
+        if len(self._heard) >= MOST_GLOVES and self._publishers is not None:
+            for glove in [glove for glove in self._heard if not self._publishers.has(glove)]:
+                del self._heard[glove]
+        return len(self._heard) < MOST_GLOVES
 
     def _hear_account(self, sample: zenoh.Sample) -> None:
         gloves = (json_object(sample.payload.to_bytes()) or {}).get("gloves")

@@ -125,17 +125,22 @@ def test_while_capture_is_away_too_it_is_incomplete_and_repaired_as_soon_as_it_i
     np.testing.assert_array_equal(repaired.reference_time_s, before.time_s)
 
 
-def test_capture_that_ended_by_itself_needs_no_repair(settings: Settings, store: Store) -> None:
-    """Its last status said how far it came."""
+def test_capture_that_ended_by_itself_leaves_a_complete_take(settings: Settings, store: Store) -> None:
+    """Its last status said how far it came; its log is compared once capture answers again."""
     with open_router([settings.zenoh]), recording_thread(settings):
         with capturing(settings):
             id = begun(store, "ended")
             time.sleep(0.3)
         stopped_ns = time.time_ns()
         store.recordings.stop(id)
-        record = settled(store, id)
+        eventually(lambda: store.recordings.get(id).state == "repairing", "capture's log to compare with")
+        record = store.recordings.get(id)
+        assert "0 missing; not compared with the capture log yet: " in record.facts["sentence"]
+        assert store.takes.get(record.facts["take"]).state == "complete"
+        with capturing(settings):
+            record = settled(store, id)
     check_law(settings, record, stopped_ns)
-    assert record.facts["missing"] == []
+    assert (record.facts["missing"], record.facts["compared"]) == ([], True)
 
 
 def test_what_the_log_does_not_have_is_missing_for_good(settings: Settings, store: Store) -> None:

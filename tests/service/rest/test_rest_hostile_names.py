@@ -50,6 +50,7 @@ ROUTES = [
     ("DELETE", "/subjects/{}"),
     ("GET", "/gloves/{}"),
     ("PUT", "/gloves/{}"),
+    ("DELETE", "/gloves/{}"),
     ("PUT", "/gloves/{}/wearer"),
     ("GET", "/takes/{}"),
     ("DELETE", "/takes/{}"),

@@ -16,9 +16,12 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from realtime_support import free_endpoint
 
 from glovecal_client.errors import ServiceError
+from glovecal_client.keys import GloveKeys
 from glovecal_client.rest import NoService, Refused, RestClient
+from glovecal_client.session import open_router
 from glovecal_models.calibration import artifact
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_service.rest.http.health import REALTIME_ALIVE
@@ -355,6 +358,25 @@ def test_recordings(client: RestClient, settings: Settings) -> None:
         client.put("/gloves/left/wearer", {"subject": "nobody"})
     assert refused.value.status == 404
     assert client.put("/gloves/left/wearer", {"subject": None})["subject"] is None
+    with pytest.raises(Refused, match="is stopping; remove the glove once that is done") as refused:
+        client.delete("/gloves/left")
+    assert refused.value.status == 409
+
+
+def test_a_glove_is_forgotten_unless_it_streams(settings: Settings) -> None:
+    settings = settings.model_copy(update={"zenoh": free_endpoint()})
+    with open_router([settings.zenoh]) as router, in_process_client(settings) as client:
+        client.put("/gloves/right/wearer", {"subject": None})
+        token = router.liveliness().declare_token(GloveKeys(settings.site, "right").alive)
+        with pytest.raises(Refused, match="'right' streams; stop its capture first") as refused:
+            client.delete("/gloves/right")
+        assert refused.value.status == 409
+        token.undeclare()
+        client.delete("/gloves/right")
+        assert "right" not in [each["name"] for each in client.get("/gloves")["seen"]]
+        with pytest.raises(Refused, match="'right' was ever seen") as refused:
+            client.delete("/gloves/right")
+        assert refused.value.status == 404
 
 
 def test_layouts_over_rest(client: RestClient, tmp_path: Path) -> None:

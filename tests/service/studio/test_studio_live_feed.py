@@ -13,7 +13,7 @@ import zenoh
 from realtime_support import eventually, free_endpoint
 
 from glovecal_client.errors import NoAnswer, QueryRefused
-from glovecal_client.keys import GloveKeys
+from glovecal_client.keys import GloveKeys, service_alive_key
 from glovecal_client.session import open_client, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag
 from glovecal_service.rest.job.answer import Job
@@ -81,6 +81,7 @@ def test_a_glove_that_does_not_answer_holds_up_nobody() -> None:
     with open_router([settings.zenoh]), open_client([settings.zenoh], wait_s=20) as session:
         mute = [GloveKeys(settings.site, name) for name in ("mute-1", "mute-2")]
         unanswered: list[zenoh.Query] = []
+        tokens = [session.liveliness().declare_token(keys.alive) for keys in mute]
         answerers = [session.declare_queryable(keys.meta, unanswered.append) for keys in mute]
         feeds = LiveFeeds(settings)
         eventually(lambda: feeds.states() == {}, "the session is there")
@@ -106,8 +107,44 @@ def test_a_glove_that_does_not_answer_holds_up_nobody() -> None:
         for feed in opened:
             feeds.release(feed)
         feeds.close()
-        for answerer in answerers:
-            answerer.undeclare()
+        for each in (*answerers, *tokens):
+            each.undeclare()
+
+
+def test_a_status_that_nobody_stands_behind_changes_nothing() -> None:
+    settings = Settings(zenoh=free_endpoint())
+    keys = GloveKeys(settings.site, "right")
+    service = service_alive_key(settings.site, "realtime-1").replace("/alive", "/status")
+
+    def say(session: zenoh.Session, run_id: str, state: str, **more: Any) -> None:
+        session.put(keys.status, json.dumps({**STREAMING, "run_id": run_id, "state": state, **more}))
+
+    with open_router([settings.zenoh]), open_client([settings.zenoh], wait_s=20) as session:
+        feeds = LiveFeeds(settings)
+        eventually(lambda: feeds.states() == {}, "the session is there")
+        for name in [f"invented-{number}" for number in range(300)]:
+            session.put(GloveKeys(settings.site, name).status, json.dumps(STREAMING))
+        say(session, "0b", "streaming")
+        time.sleep(0.3)
+        assert feeds.states() == {}
+        token = session.liveliness().declare_token(keys.alive)
+        say(session, "0a", "streaming", rate_hz=120.0)
+        account = {"run_id": "0a", "missing": 0}
+        session.put(service, json.dumps({"gloves": {"right": account}}))
+        eventually(lambda: feeds.states().get("right"), "the glove")
+        for number in range(50):
+            say(session, f"{number:x}c", "stopped", sentence="stolen")
+        eventually(lambda: len(feeds.states()) == 1, "heard")
+        time.sleep(0.2)
+        state = feeds.states()["right"]
+        assert (state.word, state.rate_hz) == ("unwatched", 120.0)
+        token.undeclare()
+        eventually(lambda: feeds.states()["right"].word == "lost", "its capture is gone")
+        for _ in range(3):
+            say(session, "0a", "streaming", sentence="stolen")
+            time.sleep(0.1)
+        assert feeds.states()["right"].word == "lost"
+        feeds.close()
 
 
 @pytest.mark.parametrize(

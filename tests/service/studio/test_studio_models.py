@@ -115,3 +115,9 @@ def test_takes_have_their_quality_and_gloves_their_layouts(
     seen = page.get_by_role("region", name="Gloves seen").last.locator("tbody th").all_inner_texts()
     assert [text.removesuffix(" (simulated)") for text in seen] == [each["name"] for each in gloves["seen"]]
     assert "seen-once (simulated)" in seen
+    page.get_by_role("button", name="Remove glove seen-once").click()
+    expect(page.get_by_role("row", name="seen-once")).to_have_count(0)
+    left = httpx.get(f"{address}/v1/gloves").json()["seen"]
+    assert [each["name"] for each in left] == [
+        each["name"] for each in gloves["seen"] if each["name"] != "seen-once"
+    ]

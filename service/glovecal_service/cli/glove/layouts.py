@@ -109,6 +109,14 @@ def wear(
     out.print(f"{glove} is worn by {subject or 'nobody'}.")
 
 
+@app.command("remove")
+def remove(glove: Glove) -> None:
+    """Forget a glove that was seen; its takes and recordings stay. Refused while it streams."""
+    with connect() as service:
+        service.delete(f"/gloves/{glove}")
+    out.print(f"Glove {glove} was removed. It is stored again once it sends frames.")
+
+
 def add_layout_file(service: RestClient, file: Path) -> str:
     """Store the layout in a TOML or JSON file; its name. Raises Refusal that names the file."""
     from glovecal_client.rest import layout_name

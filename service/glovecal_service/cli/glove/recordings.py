@@ -111,8 +111,8 @@ def _tell(finished: Recording, *, told_pre_roll: bool) -> None:
         )
     if finished.state == "repairing":
         err.print(
-            f"Recording {finished.id} is {account.sentence}. It completes as soon as capture answers; "
-            "glovecal take list shows its state.",
+            f"Recording {finished.id}: {account.sentence}. What is open is settled as soon as capture "
+            "answers.",
             style="yellow",
         )
     if told_pre_roll and account.take is not None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import Field, FiniteFloat, StringConstraints, ValidationError
 from starlette.concurrency import run_in_threadpool
 
+from glovecal_client.keys import GloveKeys
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.layout import MOST_NAMES, Layout
@@ -22,10 +23,12 @@ from glovecal_service.request_types import (
     WearingName,
 )
 from glovecal_service.rest.glove.answer import Gloves, GloveView, Latency, LayoutView
-from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.glove.live import has_publisher
+from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.http.problem import Problem, change_problems, problems
 from glovecal_service.rest.http.request_types import NameInPath
 from glovecal_service.store.database import now
+from glovecal_service.store.errors import Conflict
 from glovecal_service.store.layouts import no_layout
 from glovecal_service.store.records import GloveRecord, LayoutRecord
 
@@ -108,6 +111,22 @@ async def put_layout(layout: NameInPath, request: Request, store: StoreNeeded) -
 def set_wearer(glove: NameInPath, body: Wearer, store: StoreNeeded) -> GloveRecord:
     """The live stream is predicted by that subject's active model from then on."""
     return store.gloves.assign(glove, body.subject, body.wearing)
+
+
+@router.delete(
+    "/{glove}",
+    status_code=204,
+    response_class=Response,
+    summary="Forget a glove that was seen",
+    responses=change_problems(409),
+)
+def forget_glove(glove: NameInPath, store: StoreNeeded, parts: PartsNeeded) -> None:
+    """With who wears it and its latency; takes and recordings stay. 409 while it streams or is recorded. It
+    is stored again with its next frame."""
+    store.gloves.get(glove)
+    if has_publisher(parts.settings.zenoh, GloveKeys(parts.settings.site, glove)):
+        raise Conflict(f"glove {glove!r} streams; stop its capture first, then remove it")
+    store.gloves.remove(glove)
 
 
 @router.put(

@@ -10,7 +10,7 @@ from fastapi import APIRouter
 from pydantic import ValidationError
 
 from glovecal_client.errors import BadName, NoAnswer
-from glovecal_client.keys import all_gloves, parse_glove_key
+from glovecal_client.keys import GloveKeys, all_gloves, parse_glove_key
 from glovecal_client.session import ask, json_object, open_client
 from glovecal_service.realtime.service_status import all_service_statuses
 from glovecal_service.rest.glove.answer import LiveGlove
@@ -39,7 +39,8 @@ def live_gloves(parts: PartsNeeded) -> list[LiveGlove]:
     for answer in answers:
         gloves = (json_object(answer.payload.to_bytes()) or {}).get("gloves")
         for glove, one in gloves.items() if isinstance(gloves, dict) else ():
-            view = _as_said(glove, one, on_for.get(glove))
+            run_id = str(one.get("run_id")) if isinstance(one, dict) else ""
+            view = _as_said(glove, one, on_for.get((glove, run_id)))
             if view is not None and parts.store.actor.sees(view.subject):
                 found.setdefault(glove, view)
     return list(found.values())
@@ -62,9 +63,10 @@ def _as_said(glove: str, said: Any, on_for_s: float | None) -> LiveGlove | None:
         return None
 
 
-def _on_for_s(session: zenoh.Session, site: str) -> dict[str, float]:
-    """How long each glove is captured, by the clock of its computer. A restart of capture begins anew."""
-    found: dict[str, float] = {}
+def _on_for_s(session: zenoh.Session, site: str) -> dict[tuple[str, str], float]:
+    """By glove and run: for how many seconds it is captured, by the clock of its computer. Only that of the
+    run whose frames come is the glove's."""
+    found: dict[tuple[str, str], float] = {}
     with suppress(NoAnswer):
         for sample in ask(session, all_gloves(site, "status"), timeout_s=WITHIN_S):
             status = json_object(sample.payload.to_bytes()) or {}
@@ -72,5 +74,15 @@ def _on_for_s(session: zenoh.Session, site: str) -> dict[str, float]:
             with suppress(BadName, OverflowError):  # a stranger's key, or times of hundreds of digits
                 glove = parse_glove_key(str(sample.key_expr))[0].glove
                 if isinstance(began, int) and isinstance(now, int):
-                    found[glove] = max(0.0, (now - began) / 1e9)
+                    found[glove, str(status.get("run_id"))] = max(0.0, (now - began) / 1e9)
     return found
+
+
+def has_publisher(endpoint: str, keys: GloveKeys) -> bool:
+    """Whether a capture daemon or a camera has the glove now; none has where no router answers."""
+    try:
+        with open_client((endpoint,), wait_s=WITHIN_S) as session:
+            tokens = session.liveliness().get(keys.alive, timeout=WITHIN_S)
+            return any(reply.ok is not None for reply in tokens)
+    except NoAnswer:
+        return False

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 from nicegui import ui
 
 from glovecal_service.rest.glove.answer import Gloves, GloveView, LayoutView
-from glovecal_service.studio.heading import heading
-from glovecal_service.studio.service import Service
+from glovecal_service.studio.heading import heading, quiet_act
+from glovecal_service.studio.service import Service, refusals
 from glovecal_service.studio.table import table, text_row
 
-GLOVE_HEADS = ("Glove", "Layout", "Hand", "Worn by", "Wearing", "Measured latency", "Last seen")
+GLOVE_HEADS = ("Glove", "Layout", "Hand", "Worn by", "Wearing", "Measured latency", "Last seen", "")
 LAYOUT_HEADS = ("Layout", "Sensors", "Rotations", "Of them read from several sensors", "Origin")
 
 
@@ -21,7 +23,7 @@ async def gloves_table(service: Service) -> None:
             heading(2, "Gloves seen")
             with table("Gloves seen", GLOVE_HEADS):
                 for glove in found.seen:
-                    _glove(glove)
+                    _glove(glove, service)
     with ui.element("section").classes("tree"):
         heading(2, "Layouts")
         ui.label("A layout says which sensors a glove has, and which of them read each rotation.")
@@ -30,10 +32,10 @@ async def gloves_table(service: Service) -> None:
                 _layout(layout)
 
 
-def _glove(glove: GloveView) -> None:
+def _glove(glove: GloveView, service: Service) -> None:
     name = f"{glove.name} (simulated)" if glove.simulated else glove.name
     latency = glove.latency
-    text_row(
+    row = text_row(
         name,
         glove.layout or "–",
         glove.hand or "–",
@@ -44,6 +46,14 @@ def _glove(glove: GloveView) -> None:
         else f"{1000 * latency.latency_s:.0f} ± {1000 * latency.sd_s:.0f} ms",
         f"{glove.last_seen_at.astimezone():%Y-%m-%d %H:%M}",
     )
+
+    async def remove() -> None:
+        with refusals():
+            await service.delete(f"/gloves/{quote(glove.name)}")
+            row.delete()
+
+    with row, ui.element("td"):
+        quiet_act("Remove", remove).props["aria-label"] = f"Remove glove {glove.name}"
 
 
 def _layout(layout: LayoutView) -> None:

@@ -1,0 +1,139 @@
+"""Whether what was recorded is what the capture daemon logged: block by block, by a digest of each.
+
+Anybody in the network can publish frames that look like the glove's. Only the frames of a block whose digests
+differ are fetched and compared one by one. Those that differ from the log's, and those with numbers that
+capture never gave, leave the recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import zenoh
+
+from glovecal_client.errors import NoAnswer, QueryRefused, WireError
+from glovecal_client.gap_repair import BlockDigest, as_logged, digest_of
+from glovecal_client.wire.frame import encode_frame
+from glovecal_service.plain import reason_of
+from glovecal_service.recorder.reconciliation import Log, Outcome, OutOfTime, Patience, reconcile
+from glovecal_service.recorder.run_ledger import RecordedFrames, RunLedger
+
+PAUSE_S = 0.005
+"""Between two blocks: capture has its glove to read."""
+
+
+ROUNDS = 3
+"""What was taken out leaves gaps; what fills them came from the log."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Of all that is recorded."""
+
+    taken_out: int = 0
+    """Frames that were not the capture's; they left the books of the recording."""
+    not_logged: int = 0
+    """Frames that stay, although the log does not have them: capture gave their numbers, as far as is known.
+    Its disk was full, or the log is damaged."""
+
+
+def reconcile_and_compare(file: RunLedger, log: Log, stop_wall_ns: int | None, patience: Patience) -> Outcome:
+    """As ``reconcile``; then what is recorded is compared with the log, and what it lacks then is fetched."""
+    outcome = reconcile(file, log, stop_wall_ns, patience)
+    if not outcome.complete:
+        return outcome
+    for _ in range(ROUNDS):
+        try:
+            found = compare(file, log, patience)
+        except QueryRefused as error:
+            return replace(outcome, not_compared=reason_of(error))
+        except (NoAnswer, WireError, zenoh.ZError) as error:
+            return replace(outcome, not_compared=reason_of(error), may_be_compared=True)
+        except OutOfTime:
+            return replace(outcome, not_compared="the capture log has more to tell", may_be_compared=True)
+        why = f"{found.not_logged} frames are not in it" if found.not_logged else ""
+        if not found.taken_out:
+            return replace(outcome, not_compared=why)
+        outcome = reconcile(file, log, stop_wall_ns, patience)
+        if not outcome.complete:
+            return outcome
+    return replace(outcome, not_compared="the capture log tells something else each time")
+
+
+def compare(file: RunLedger, log: Log, patience: Patience) -> Comparison:
+    """Hold every frame of ``file`` against the capture log, and take out what is not from there.
+
+    Raises NoAnswer, WireError, OutOfTime; QueryRefused where a run has no log, when all others were compared.
+    """
+    refused: QueryRefused | None = None
+    out: dict[int, list[int]] = {}
+    not_logged = 0
+    for run_id, frames in file.recorded().items():
+        try:
+            strange, unknown = _compared(run_id, frames, log, patience)
+        except QueryRefused as error:
+            refused = error
+            continue
+        never_given = [sequence for sequence in unknown if sequence > file.reached.get(run_id, sequence)]
+        strange += never_given
+        not_logged += len(unknown) - len(never_given)
+        if strange:
+            out[run_id] = strange
+    for run_id, strange in out.items():
+        file.take_out(run_id, strange)
+    taken_out = sum(map(len, out.values()))
+    if refused is not None and not taken_out:
+        raise refused
+    return Comparison(taken_out, not_logged)
+
+
+def _compared(
+    run_id: int, frames: RecordedFrames, log: Log, patience: Patience
+) -> tuple[list[int], list[int]]:
+    """Numbers of frames that differ from the log's, and of those that the log does not have."""
+    strange: list[int] = []
+    unknown: list[int] = []
+    at, last = 0, int(frames.sequences[-1])
+    while at < len(frames):
+        if patience.is_over:
+            raise OutOfTime
+        first = int(frames.sequences[at])
+        digest = _digest(log, run_id, first, last)
+        if digest is None:
+            unknown += frames.sequences[at:].tolist()
+            break
+        until = at + int(np.searchsorted(frames.sequences[at:], digest.last, side="right"))
+        if until == at:
+            raise WireError(f"the capture log of run {run_id:016x} answers for none of the frames asked for")
+        rows = slice(at, until)
+        messages = frames.messages(rows)
+        if digest.frames != len(messages) or digest.sha256 != digest_of(messages):
+            logged = _logged(log, run_id, first, digest.last, patience)
+            for sequence, message in zip(frames.sequences[rows].tolist(), messages, strict=True):
+                if sequence not in logged:
+                    unknown.append(sequence)
+                elif logged[sequence] != message:
+                    strange.append(sequence)
+        at = until
+        patience.wait(PAUSE_S)
+    return strange, unknown
+
+
+def _digest(log: Log, run_id: int, first: int, last: int) -> BlockDigest | None:
+    """A digest that nothing equals, of a capture that gives none but has the run's log."""
+    try:
+        return log.digest(run_id, first, last)
+    except QueryRefused:
+        block = log.block(run_id, first, last)
+        return BlockDigest(-1, block[0].sequence, block[-1].sequence, "") if block else None
+
+
+def _logged(log: Log, run_id: int, first: int, last: int, patience: Patience) -> dict[int, bytes]:
+    found: dict[int, bytes] = {}
+    while first <= last and (block := log.block(run_id, first, last)):
+        found |= {frame.sequence: as_logged(encode_frame(frame)) for frame in block}
+        first = block[-1].sequence + 1
+        if patience.is_over:
+            raise OutOfTime
+    return found
