@@ -260,7 +260,7 @@ class SiteFolder:
                 f"the authority's private key {file} cannot be read ({reason_of(error)}); if it was "
                 "moved away, say where it is with --authority-key"
             ) from error
-        except ValueError as error:
+        except UnicodeDecodeError as error:
             raise BadInput(f"{file} is no private key of glovecal site; give its authority.key") from error
 
     def _kept_api_key(self) -> str | None:
