@@ -11,6 +11,7 @@
     ├── DamagedLog          a recording cannot be read at all (a damaged tail is repaired instead)
     ├── CaptureRefused      capture must not start (another publisher has the glove)
     ├── NoAnswer            nobody answered a query; the sentence says what was asked
+    │   ├── NotAdmitted     a site does not let this computer in; the sentence says why
     │   └── QueryRefused    somebody answered, with an error instead of data
     └── ServiceError        the service answered a REST call with a problem (status, title, detail)
 
@@ -69,6 +70,10 @@ class CaptureRefused(ClientError):
 
 class NoAnswer(ClientError):
     """Nobody answered a query, or the answer was empty."""
+
+
+class NotAdmitted(NoAnswer):
+    """A site does not let this computer in: its certificate is expired, of another site, or revoked."""
 
 
 class QueryRefused(NoAnswer):

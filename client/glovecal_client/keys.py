@@ -157,3 +157,8 @@ def service_alive_key(site: str, instance: str) -> str:
 def all_services(site: str) -> str:
     """Key expression for the liveliness tokens of every service process of a site."""
     return f"{ROOT}/{check_identifier(site, 'site')}/service/*/alive"
+
+
+def admission_key(site: str) -> str:
+    """Liveliness token of the router of a site with certificates: who sees it is let in there."""
+    return f"{ROOT}/{check_identifier(site, 'site')}/service/router/admits"

@@ -21,6 +21,9 @@ import numpy as np
 
 from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.installation import not_installed
+from glovecal_client.site.certificates import client_context
+from glovecal_client.site.login import why_refused
+from glovecal_client.site.member import Member, member_of_environment
 
 if TYPE_CHECKING:
     import httpx
@@ -53,7 +56,8 @@ class RestClient:
     """A session with one service. Paths are below ``/v1``: ``client.get("/takes", {"subject": "anna"})``.
 
     Answers are the service's JSON as plain data. Every refusal is a ``Refused`` and no answer a
-    ``NoService``, both ``ServiceError``. Not to be shared between threads.
+    ``NoService``, both ``ServiceError``. Not to be shared between threads. At an ``https`` address the
+    service must show a certificate of the site in ``GLOVECAL_SITE_FILE``, else one this computer trusts.
     """
 
     def __init__(
@@ -65,11 +69,15 @@ class RestClient:
         key: str | None = None,
     ) -> None:
         """``transport`` replaces the network; ``patience_s`` bounds the wait for one answer; ``key``: with
-        which a service that asks is told who this is."""
+        which a service that asks is told who this is.
+
+        Raises BadName, also for a site's file that cannot be used.
+        """
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
         httpx = _import_httpx()
+        self._member: Member | None = member_of_environment() if parts.scheme == "https" else None
         self.url: str = url.rstrip("/")
         self.warnings: list[str] = []
         """What answers said in ``Warning`` headers, each once: rows of a list that are damaged."""
@@ -77,6 +85,7 @@ class RestClient:
             base_url=f"{self.url}/v1",
             transport=transport,
             timeout=httpx.Timeout(patience_s, connect=5.0),
+            verify=True if self._member is None else client_context(self._member),
             trust_env=False,
             headers={} if key is None else {"Authorization": f"Bearer {key}"},
         )
@@ -266,12 +275,7 @@ class RestClient:
         try:
             response = self._http.request(method, path, **request)
         except (httpx.ConnectError, httpx.ConnectTimeout) as error:
-            raise NoService(
-                503,
-                "No service",
-                f"nobody answers at {self.url}; start it with `glovecal serve`, or unset GLOVECAL_URL to "
-                "work on the local folder",
-            ) from error
+            raise NoService(503, "No service", self._why_not_connected(error)) from error
         except httpx.TimeoutException as error:
             raise NoService(504, "No answer", f"{self.url} did not answer {method} {path} in time") from error
         except httpx.TransportError as error:
@@ -284,6 +288,22 @@ class RestClient:
             if sentence not in self.warnings:
                 self.warnings.append(sentence)
         return response
+
+    def _why_not_connected(self, error: Exception) -> str:
+        parts = urlsplit(self.url)
+        if self._member is not None:
+            why = why_refused(self._member, f"tls/{parts.netloc if parts.port else f'{parts.netloc}:443'}")
+            if why is not None:
+                return why
+        elif "CERTIFICATE_VERIFY_FAILED" in str(error):
+            return (
+                f"this computer does not trust the certificate of {self.url}; name the site's file that was "
+                "made for it there (glovecal site add) in GLOVECAL_SITE_FILE"
+            )
+        return (
+            f"nobody answers at {self.url}; start it with `glovecal serve`, or unset GLOVECAL_URL to "
+            "work on the local folder"
+        )
 
 
 def _refusal(response: httpx.Response) -> ServiceError:

@@ -25,6 +25,8 @@ from multiprocessing.process import BaseProcess
 from threading import Event, Thread
 from typing import Any, Protocol
 
+from glovecal_client.errors import ClientError
+from glovecal_client.hosts import is_loopback
 from glovecal_client.installation import not_installed
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS, listen_alone
 from glovecal_client.private_files import keep_private
@@ -35,12 +37,16 @@ from glovecal_client.program import (
     never_wait,
     say,
 )
+from glovecal_client.session import encrypted
+from glovecal_client.site.certificates import check_certificate
+from glovecal_client.site.member import read_member
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
+from glovecal_service.site.site_folder import SiteFolder
 from glovecal_service.store.data_folder_lock import DataFolderLock, FolderInUse
 from glovecal_service.store.store import Store
 
@@ -150,7 +156,7 @@ def _serve(settings: Settings, parts: list[Part], lock: DataFolderLock) -> int:
     if problem:
         print(f"glovecal serve: {problem}", file=sys.stderr)
         return 1
-    lock.say_who(f"process {os.getpid()} on {socket.gethostname()}, http://{settings.host}:{settings.port}")
+    lock.say_who(f"process {os.getpid()} on {socket.gethostname()}, {_web_address(settings)}")
     stopped = Event()
     handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
@@ -182,7 +188,7 @@ def _supervise(parts: list[Part], settings: Settings, lifeline: Lifeline, stoppe
 
 def _why_not(settings: Settings, parts: list[Part]) -> str:
     """Why the service cannot start here, "" if it can. Also brings the store up to date, once for all."""
-    if problem := _ports_problem(parts):
+    if problem := _others_problem(settings) or _ports_problem(parts):
         return problem
     if settings.studio and find_spec("nicegui") is None:
         return f"{not_installed('the studio', 'nicegui')} (or leave it out: glovecal serve --no-studio)"
@@ -196,6 +202,46 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
     return ""
+
+
+def _others_problem(settings: Settings) -> str:
+    """Beyond loopback nobody is served without certificates; "" if all is well."""
+    for variable, host in (("GLOVECAL_HOST", settings.host), ("GLOVECAL_ZENOH", _zenoh_host(settings))):
+        if settings.site_file is None and not is_loopback(host):
+            return (
+                f"{variable} lets other computers in ({host}), and nothing would be encrypted. Make "
+                "certificates with `glovecal site init --host NAME`, and name the file that it writes in "
+                "GLOVECAL_SITE_FILE"
+            )
+    if settings.site_file is None:
+        return ""
+    if not settings.site_file.exists():
+        return f"there is no file {settings.site_file}; make it with `glovecal site init --host NAME`"
+    try:
+        member = read_member(settings.site_file)
+        check_certificate(member)
+        register = SiteFolder(settings.data).register()
+    except (ClientError, GlovecalError) as error:
+        return reason_of(error)
+    if member.kind != "service":
+        return (
+            f"{settings.site_file} is the file of a {member.kind}; name the service's own, "
+            f"{SiteFolder(settings.data).service_file}, in GLOVECAL_SITE_FILE"
+        )
+    if not member.site == settings.site == register.site:
+        return (
+            f"{settings.site_file} is of site {member.site!r}, {SiteFolder(settings.data).folder} of "
+            f"{register.site!r}, and GLOVECAL_SITE is {settings.site!r}: they must be one"
+        )
+    return ""
+
+
+def _zenoh_host(settings: Settings) -> str:
+    """The host that the router listens on, "127.0.0.1" for what no other computer reaches."""
+    host, port = _zenoh_address(settings)
+    if port or host:
+        return host
+    return "127.0.0.1" if settings.zenoh.startswith(("unixsock-stream/", "unixpipe/")) else "0.0.0.0"
 
 
 def _ports_problem(parts: list[Part]) -> str:
@@ -230,15 +276,24 @@ def _port_problem(part: Part) -> str:
 
 
 def _banner(settings: Settings) -> str:
-    shown = f"[{settings.host}]" if ":" in settings.host else settings.host
-    studio = f"\n  studio  http://{shown}:{settings.port}/studio/live" if settings.studio else ""
+    web = _web_address(settings)
+    studio = f"\n  studio  {web}/studio/live" if settings.studio else ""
     return (
         "Glovecal is running. Ctrl-C stops it.\n"
-        f"  REST    http://{shown}:{settings.port}/v1  (in a browser: / and /docs)\n"
-        f"  zenoh   {settings.zenoh}, keys glovecal/{settings.site}/<glove>/...\n"
+        f"  REST    {web}/v1  (in a browser: / and /docs)\n"
+        f"  zenoh   {_zenoh_shown(settings)}, keys glovecal/{settings.site}/<glove>/...\n"
         f"  data    {settings.data.resolve()}"
         f"{studio}"
     )
+
+
+def _web_address(settings: Settings) -> str:
+    shown = f"[{settings.host}]" if ":" in settings.host else settings.host
+    return f"{'http' if settings.site_file is None else 'https'}://{shown}:{settings.port}"
+
+
+def _zenoh_shown(settings: Settings) -> str:
+    return settings.zenoh if settings.site_file is None else encrypted(settings.zenoh)
 
 
 def _start(part: Part, settings: Settings, lifeline: Lifeline) -> None:
@@ -333,13 +388,19 @@ def web(settings: Settings, stopped: Event, started: Callable[[], None]) -> None
 
     from glovecal_service.rest.app import create_app
     from glovecal_service.rest.http.server import server_config
+    from glovecal_service.site.web_login import WebLogin
 
     app = create_app(settings)
     if settings.studio:
         from glovecal_service.studio.mount import mount_studio
 
         mount_studio(app, settings)
-    server = uvicorn.Server(server_config(app, settings.host, settings.port))
+    context = None
+    if settings.site_file is not None:
+        login = WebLogin(settings, app.state.allowed_hosts)
+        context = login.context
+        Thread(target=login.follow, args=(stopped,), daemon=True).start()
+    server = uvicorn.Server(server_config(app, settings.host, settings.port, context))
     setattr(server, "capture_signals", nullcontext)  # noqa: B010  signals are ours, uvicorn takes them over
     Thread(target=_follow_server, args=(server, stopped, started), daemon=True).start()
     server.run()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -12,6 +13,9 @@ from glovecal_models.names import check_identifier
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
+
+
+_HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
 
 
 class Settings(BaseSettings):
@@ -29,6 +33,12 @@ class Settings(BaseSettings):
     """Endpoint of the router that the service runs."""
     site: str = "lab"
     """Second part of every zenoh key."""
+    site_file: Path | None = None
+    """The service's own file of a site with certificates (``glovecal site init``); None: nothing is
+    encrypted, and the service listens on loopback only."""
+    allowed_hosts: str = ""
+    """Names and addresses that the service answers to, separated by commas; "": those of loopback and those
+    in its certificate."""
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8600
     login: Literal["beyond loopback", "always"] = "beyond loopback"
@@ -49,6 +59,19 @@ class Settings(BaseSettings):
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256
     keep_days: Annotated[float, Field(gt=0, le=36500)] = 90.0
     """How long uploads that no take came from, films and ledgers of recordings that became takes are kept."""
+
+    @field_validator("site_file", mode="before")
+    @classmethod
+    def _nothing_is_no_file(cls, site_file: Any) -> Any:
+        return site_file or None
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _hosts_are_names(cls, allowed_hosts: str) -> str:
+        for name in filter(None, (each.strip() for each in allowed_hosts.split(","))):
+            if not _HOST.match(name):
+                raise ValueError(f"{name!r} is neither the name nor the address of a computer")
+        return allowed_hosts
 
     @field_validator("site")
     @classmethod

@@ -31,6 +31,7 @@ from glovecal_client.keys import GloveKeys, check_identifier, subject_name
 from glovecal_client.private_files import keep_private
 from glovecal_client.program import never_wait, run_command, say, stopped_by_signals
 from glovecal_client.session import DEFAULT_ENDPOINT
+from glovecal_client.site.member import settle_environment, site_file
 
 UNIT_LOG_LIMIT = 8_000_000_000
 """Bytes that capture at boot keeps, five days at 120 Hz."""
@@ -79,6 +80,7 @@ def script() -> NoReturn:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """0 when stopped cleanly, 1 with a sentence when it could not capture."""
+    settle_environment()
     asked = _parser().parse_args(arguments)
     keep_private()
     try:
@@ -234,7 +236,7 @@ RestrictSUIDSGID=yes
 RestrictNamespaces=yes
 RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
 SystemCallArchitectures=native
-{listening}
+{listening}{site}
 [Install]
 WantedBy=multi-user.target
 """
@@ -277,8 +279,21 @@ def unit_text(name: str, glove: str, arguments: Sequence[str], *, dials_in: bool
     program = (sys.executable, "-I", "-m", "glovecal_client.capture.command")
     command = " ".join(_quoted(word) for word in (*program, *arguments, "--data", f"/var/lib/{name}"))
     return _UNIT.format(
-        name=name, glove=glove, command=command, listening="" if dials_in else "SocketBindDeny=any\n"
+        name=name,
+        glove=glove,
+        command=command,
+        listening="" if dials_in else "SocketBindDeny=any\n",
+        site=_credential(),
     )
+
+
+def _credential() -> str:
+    """systemd hands the site's file to a user that could not read it; after a renewal, restart the unit."""
+    file = site_file()
+    if file is None:
+        return ""
+    place = str(file.absolute()).replace("%", "%%")
+    return f"LoadCredential=site.glovecal:{place}\nEnvironment=GLOVECAL_SITE_FILE=%d/site.glovecal\n"
 
 
 def _quoted(word: str) -> str:

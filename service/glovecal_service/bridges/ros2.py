@@ -115,7 +115,7 @@ class Ros2Bridge(Bridge):
     def __enter__(self) -> Ros2Bridge:
         endpoint = f"tcp/{self._host}:{self._port}"
         try:
-            self._session = self._opened.enter_context(open_client([endpoint], wait_s=_WAIT_S))
+            self._session = self._opened.enter_context(open_client([endpoint], wait_s=_WAIT_S, foreign=True))
         except NoAnswer as error:
             raise BadInput(
                 f"no ROS 2 router at {self._host}:{self._port}; start it (ros2 run rmw_zenoh_cpp "

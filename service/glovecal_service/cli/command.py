@@ -20,6 +20,7 @@ import typer.main
 
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
 from glovecal_client.program import handle_signals, run_command
+from glovecal_client.site.member import settle_environment
 from glovecal_service.cli import completion, demo, overview, serve
 from glovecal_service.cli.access import audit, keys
 from glovecal_service.cli.asking import verb, verb_at_once
@@ -42,6 +43,7 @@ from glovecal_service.cli.glove import (
 from glovecal_service.cli.job import jobs
 from glovecal_service.cli.model import comparison, models, quick_check, training
 from glovecal_service.cli.sampling import samplings
+from glovecal_service.cli.site import sites
 from glovecal_service.cli.subject import subjects
 from glovecal_service.cli.take import takes
 from glovecal_service.cli.terminal.printing import EXPECTED, INTERRUPTED, err, exit_code_of, out, sentence_of
@@ -103,6 +105,7 @@ app.add_typer(subjects.app, name="subject", rich_help_panel=KEEP)
 app.add_typer(jobs.app, name="job", rich_help_panel=KEEP)
 app.add_typer(keys.app, name="key", rich_help_panel=KEEP)
 app.add_typer(audit.app, name="audit", rich_help_panel=KEEP)
+app.add_typer(sites.app, name="site", rich_help_panel=KEEP)
 
 
 def _print_version(wanted: bool) -> None:
@@ -149,6 +152,7 @@ def script() -> NoReturn:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the verb of ``arguments``, the process's own by default; ends in SystemExit where it is refused."""
     completion.prepare()
+    settle_environment()
     try:
         command()(arguments, prog_name=completion.PROGRAM)
     except KeyboardInterrupt:

@@ -13,7 +13,6 @@ import zenoh
 
 from glovecal_client.keys import GloveKeys, all_gloves, service_alive_key
 from glovecal_client.publishers import Publishers
-from glovecal_client.session import open_router
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.incoming.arrivals import Arrivals
@@ -27,6 +26,7 @@ from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas
 from glovecal_service.realtime.served_model import ServedModels
 from glovecal_service.realtime.service_status import ServiceStatus
 from glovecal_service.settings import Settings
+from glovecal_service.site.router import SiteRouter, service_router
 from glovecal_service.store.store import Store
 
 GIL_SWITCH_S = 0.0005
@@ -45,9 +45,9 @@ def run_real_time(settings: Settings, stopped: Event, started: Callable[[], None
     sys.setswitchinterval(GIL_SWITCH_S)
     go_first()
     instance = f"realtime-{secrets.token_hex(4)}"
-    with open_router([settings.zenoh]) as session:
+    with service_router(settings) as (session, router):
         token = session.liveliness().declare_token(service_alive_key(settings.site, instance))
-        _serve(session, settings, instance, stopped, started)
+        _serve(session, settings, instance, stopped, started, router)
         token.undeclare()
 
 
@@ -57,6 +57,7 @@ def _serve(
     instance: str,
     stopped: Event,
     started: Callable[[], None] | None,
+    router: SiteRouter | None,
 ) -> None:
     models = ServedModels()
     arrivals = Arrivals(session, all_gloves(settings.site, "raw"))
@@ -85,6 +86,7 @@ def _serve(
         settings.data,
     )
     explanations = LiveExplanations(session, settings.site, lambda: loop.lanes)
+    rules = [] if router is None else [("site rules", router.follow)]
     _settle_garbage()
     failures: list[str] = []
     threads = [
@@ -94,6 +96,7 @@ def _serve(
             ("models", watcher.run),
             ("status", status.run),
             ("explanations", explanations.run),
+            *rules,
         )
     ]
     if started is not None:

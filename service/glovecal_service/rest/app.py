@@ -43,7 +43,7 @@ from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
 from glovecal_service.rest.http.problem import install_openapi
-from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who, is_loopback
+from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
 from glovecal_service.rest.model import (
@@ -74,6 +74,7 @@ from glovecal_service.rest.take import (
     videos,
 )
 from glovecal_service.settings import Settings
+from glovecal_service.site.web_login import AllowedHosts
 from glovecal_service.store.retention import sweep
 from glovecal_service.store.store import Store
 
@@ -212,7 +213,8 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
 
     app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)
     app.add_middleware(AccessGuard, is_asked=asks_who(settings))
-    app.add_middleware(RequestGuard, loopback_only=is_loopback(settings.host))
+    app.state.allowed_hosts = AllowedHosts(settings)
+    app.add_middleware(RequestGuard, hosts=app.state.allowed_hosts)
     app.add_middleware(Observation, metrics=metrics)
 
 

@@ -13,10 +13,10 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 from glovecal_client.clock import clock_ns, wall_ns
+from glovecal_client.hosts import is_loopback
 from glovecal_models.errors import BadInput
 from glovecal_service.recorder.triggers.formats import Endpoint
 from glovecal_service.recorder.triggers.trigger import Reader, Request, Trigger, UnknownPacket
-from glovecal_service.rest.http.request_guard import is_loopback
 
 RECEIVED_AT_MOST = 65_536
 LOOK_EVERY_S = 0.2

@@ -1,8 +1,8 @@
 """Requests that no router should see: hostile paths, pages of other sites, bodies too large or too slow.
 
-Without logins the browser is the way in: any page can make it send requests to 127.0.0.1, and a host
-name that an attacker points at 127.0.0.1 (DNS rebinding) makes such a page same-origin. So, while bound
-to loopback, only loopback names are answered, and a changing request of another origin is refused.
+The browser is a way in: any page can make it send requests to this service, and a host name that an
+attacker points at its address (DNS rebinding) makes such a page same-origin. So only loopback names and
+those that the service is known by are answered, and a changing request of another origin is refused.
 
 Neither Starlette nor uvicorn bounds the time of a body (trust.md 2.4: 200 half-sent requests still open
 after 12 s), so its bytes and its time are bounded here, below the framework: the body is counted as it
@@ -12,13 +12,13 @@ passes, and an answer the application tries to give after a bound was broken is 
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from urllib.parse import urlsplit
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from glovecal_client.hosts import is_loopback
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.settings import Settings
 
@@ -29,9 +29,10 @@ LONGEST_PATH = 1024
 class RequestGuard:
     """ASGI middleware: 404 for paths that are not plain, 421 for foreign hosts, 403 for foreign origins."""
 
-    def __init__(self, app: ASGIApp, *, loopback_only: bool) -> None:
+    def __init__(self, app: ASGIApp, *, hosts: Container[str] = ()) -> None:
+        """``hosts``: names that are answered beside those of loopback."""
         self.app = app
-        self.loopback_only = loopback_only
+        self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -50,11 +51,13 @@ class RequestGuard:
         if not _is_plain_path(scope["path"], scope.get("raw_path") or b""):
             return Problem(404, "not-found", "There is nothing under this path.")
         host = headers.get(b"host", "")
-        if self.loopback_only and not is_loopback(_host_name(host)):
+        name = _host_name(host)
+        if not is_loopback(name) and name not in self.hosts:
             return Problem(
                 421,
                 "foreign-host",
-                "This service answers to localhost and 127.0.0.1 only; set GLOVECAL_HOST to serve others.",
+                "This service does not answer to that name. Use one that stands in its certificate, or have "
+                "the name added to GLOVECAL_ALLOWED_HOSTS.",
             )
         if _changes_something(scope) and not _same_origin(headers, host):
             return Problem(403, "foreign-origin", "A page of another site may not change anything here.")
@@ -64,16 +67,6 @@ class RequestGuard:
 def asks_who(settings: Settings) -> bool:
     """Whether whoever asks has to prove who they are."""
     return settings.login == "always" or not is_loopback(settings.host)
-
-
-def is_loopback(host: str) -> bool:
-    """Whether ``host`` (a name or an address, no port) means this computer."""
-    if host.lower().rstrip(".") == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def _is_plain_path(path: str, raw_path: bytes) -> bool:

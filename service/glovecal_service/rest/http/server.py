@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 from typing import Any
 
 import uvicorn
@@ -62,8 +63,9 @@ def _send_at_once(transport: asyncio.Transport) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
-def server_config(app: Any, host: str, port: int) -> uvicorn.Config:
-    """The configuration to start ``uvicorn.Server`` with, for ``app`` from ``create_app``.
+def server_config(app: Any, host: str, port: int, context: ssl.SSLContext | None = None) -> uvicorn.Config:
+    """The configuration to start ``uvicorn.Server`` with, for ``app`` from ``create_app``; with a ``context``
+    it speaks TLS.
 
     Server-sent events stay open for ever by design, hence the bound on the graceful shutdown. Logs go
     through ``logging`` as the process has set it up; the access log is the application's own.
@@ -74,6 +76,7 @@ def server_config(app: Any, host: str, port: int) -> uvicorn.Config:
         port=port,
         http=PatientH11Protocol,
         log_config=None,
+        ssl_context_factory=None if context is None else lambda *_: context,
         access_log=False,
         server_header=False,
         date_header=True,

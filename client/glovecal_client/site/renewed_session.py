@@ -1,0 +1,60 @@
+"""The session of a member whose file is read again when it changes: a renewal loses no connection."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+
+from glovecal_client.errors import ClientError
+from glovecal_client.site.certificates import check_certificate
+from glovecal_client.site.kept_session import KeptSession
+from glovecal_client.site.member import Member, read_member, site_file
+
+LOOK_EVERY_S = 1.0
+_log = logging.getLogger("glovecal.site")
+
+
+class RenewedSession:
+    """``session`` is used as a ``zenoh.Session``. Close this."""
+
+    def __init__(
+        self, member: Member, session: zenoh.Session, open_session: Callable[[Member], zenoh.Session]
+    ) -> None:
+        """``session`` is open already, as ``member``; ``open_session`` opens the later ones."""
+        self._member = member
+        self._file = site_file()
+        first = [session]
+        self.session = KeptSession(lambda: first.pop() if first else open_session(self._member), alone=False)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._follow, name="site file", daemon=True)
+        self._thread.start()
+
+    def _follow(self) -> None:
+        while self._file is not None and not self._over.wait(LOOK_EVERY_S):
+            self._look(self._file)
+
+    def _look(self, file: Path) -> None:
+        """A file that cannot be used is left alone: the certificate in use may be good for long."""
+        before = self._member
+        try:
+            found = read_member(file)
+            if found == before:
+                return
+            check_certificate(found)
+            self._member = found
+            self.session.reopen()
+            _log.info("the renewed certificate of %s is in use", found.name)
+        except ClientError as error:
+            _log.debug("the site's file: %s", error)
+        except zenoh.ZError:
+            self._member = before  # tried again at the next look
+            _log.warning("no connection with the renewed certificate; trying again")
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self.session.close()

@@ -1,0 +1,1 @@
+"""A site of several computers: its authority, its members and their certificates."""
