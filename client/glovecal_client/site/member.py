@@ -98,15 +98,14 @@ def read_member(file: Path) -> Member:
         raise BadSiteFile(f"the site's file {file} cannot be read: {reason_of(error)}") from error
     try:
         if len(content) > LARGEST_FILE:
-            raise ValueError(f"it is larger than {LARGEST_FILE // 1024} kB")
+            raise _Wrong(f"it is larger than {LARGEST_FILE // 1024} kB")
         return _member(json.loads(content))
     except RecursionError as error:
         raise BadSiteFile(_not_usable(file, "it is nested too deeply")) from error
     except (BadName, _Wrong) as error:
         raise BadSiteFile(_not_usable(file, str(error))) from error
     except ValueError as error:
-        problem = str(error) if len(content) > LARGEST_FILE else "it is not JSON"
-        raise BadSiteFile(_not_usable(file, problem)) from error
+        raise BadSiteFile(_not_usable(file, "it is not JSON")) from error
 
 
 def _not_usable(file: Path, problem: str) -> str:

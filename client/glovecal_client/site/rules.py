@@ -45,8 +45,8 @@ _MESSAGES: dict[Action, tuple[tuple[str, str], ...]] = {
 }
 """What zenoh calls it, as the router sees it: what comes in from a member, what goes out to it."""
 _OF_ANY_GLOVE = {(_OUT, "declare_subscriber"), (_OUT, "declare_queryable"), (_OUT, "query")}
-"""Who listens or asks does so for all gloves at once (``*/raw``), and zenoh lets through only what a rule covers
-whole. A capture gets no more by it: what it answers, and what it sends, is bound to its gloves."""
+"""Who listens or asks does so for all gloves at once (``*/raw``), and zenoh lets through only what a rule
+covers whole. A capture gets no more by it: what it answers, and what it sends, is bound to its gloves."""
 _ALL_MESSAGES = (
     "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable", "liveliness_token",
     "liveliness_query", "declare_liveliness_subscriber",

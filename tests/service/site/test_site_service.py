@@ -1,4 +1,4 @@
-"""``glovecal serve`` of a site: nothing beyond loopback without certificates, and everything over TLS with them."""
+"""``glovecal serve`` of a site: nothing beyond loopback without certificates, with them everything over TLS."""
 
 from __future__ import annotations
 
