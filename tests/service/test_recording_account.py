@@ -221,6 +221,7 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
     before=[("unreachable", 0), ("received", 3), ("jumped", 5000), ("lost", 2), ("received", 2)],
     after=[("received", 1)],
 )
+@example(before=[("forged", 2), ("received, not logged", 2), ("lost", 1)], after=[("unreachable", 0)])
 @example(before=[("restarted", 2), ("restarted", 0), ("received", 1)], after=[("received", 1)])
 @given(before=STEPS, after=STEPS)
 def test_every_frame_up_to_the_stop_is_recorded_or_missing(

@@ -42,6 +42,8 @@ _HEAD = struct.Struct("<4sBBHQqqQHH")
 _SEQUENCE = struct.Struct("<Q")
 _SEQUENCE_AT = 8
 _RUN_ID_AT = 32
+RUN_ID_BYTES = slice(_RUN_ID_AT, _RUN_ID_AT + 8)
+"""Of a message: equal for all frames of a run."""
 MAX_FRAME_BYTES = _HEAD.size + 4 * (MAX_SENSORS + MAX_CONTEXT) + CHECKSUM_BYTES
 
 

@@ -18,7 +18,7 @@ MOST_OF_A_GLOVE = 8
 """The newest of those that wait."""
 MOST_BYTES = 1 << 20
 """Read at a time, all gloves together, beyond the first document of each."""
-WAITING_LIMIT = 1024
+WAITING_LIMIT = 512
 
 
 class Document(NamedTuple):

@@ -40,6 +40,7 @@ class Refusal(Enum):
     SENSOR_COUNT = "sensor_count"
     OUT_OF_RANGE = "out_of_range"
     NOT_PREDICTABLE = "not_predictable"
+    TOO_MANY = "too_many"
 
 
 class Refused(Exception):
@@ -284,6 +285,10 @@ class FrameGate:
         """So many messages came before the next one for ``pass_frame`` and are thrown away without a look."""
         self._messages += count
         self._unread += count
+
+    def note_strange(self, count: int) -> None:
+        """So many messages came that are not of the run, and are thrown away without a look."""
+        self._messages += count
 
     def pass_frame(self, message: bytes, received_ns: int) -> Frame:
         """The frame in ``message``, received at ``received_ns`` of this process' monotonic clock."""

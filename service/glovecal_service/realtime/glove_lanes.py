@@ -19,14 +19,16 @@ import numpy as np
 
 from glovecal_client.errors import BadName, WireError
 from glovecal_client.keys import GloveKeys, parse_glove_key
-from glovecal_client.wire.frame import Frame, decode_frame
+from glovecal_client.wire.frame import RUN_ID_BYTES, Frame, decode_frame
 from glovecal_models.diagnosis.worn_glove import GloveFinding, live_findings
-from glovecal_service.incoming.frame_gate import FrameGate, RefusalCount, Refused, Standing
+from glovecal_service.incoming.frame_gate import FrameGate, Refusal, RefusalCount, Refused, Standing
+from glovecal_service.incoming.rate_limit import MOST_HZ, RateLimit
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
 
 WAITING_LIMIT = 64
+_TOO_MANY = Refused(Refusal.TOO_MANY, "more messages than a glove sends; another publisher uses its name")
 
 
 class Waiting(NamedTuple):
@@ -66,18 +68,34 @@ class GlovePipeline:
         self.record: FrameRecord | None = None
         """Put here by who wants the next frame's prediction written down; taken away with it."""
         self._waiting: deque[Waiting] = deque()
+        self._run = b""
+        """The run's id as its messages have it."""
+        self._own_rate, self._other_rate = RateLimit(), RateLimit()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, message: bytes, received_ns: int) -> None:
-        """Let a message wait; the oldest goes when too many do."""
+    def declare_rate(self, rate_hz: Any) -> None:
+        """What its capture says of its rate, frames a second; anything may stand there. From any thread."""
+        known = float(rate_hz) if isinstance(rate_hz, int | float) and 0 < rate_hz < MOST_HZ else None
+        self._own_rate.declare(known)
+        self._other_rate.declare(known)
+
+    def add(self, message: bytes, received_ns: int) -> bool:
+        """Let a message wait; the oldest goes when too many do. False if it is thrown away at once: no glove
+        sends so many. What others send under its name does not cost the run its frames."""
         self.received += 1
+        is_own = message[RUN_ID_BYTES] == self._run
+        if not (self._own_rate if is_own else self._other_rate).allows(received_ns):
+            (self.gate.note_unread if is_own else self.gate.note_strange)(1)
+            self.refusals.add(_TOO_MANY)
+            return False
         if len(self._waiting) >= WAITING_LIMIT:
             self._waiting.popleft()
             self.gate.note_unread(1)
             self.skip(1)
         self._waiting.append(Waiting(message, received_ns))
+        return True
 
     def skip(self, count: int) -> None:
         self.skipped += count
@@ -107,6 +125,7 @@ class GlovePipeline:
             return None
         self.valid_ns = waiting.received_ns
         if self.gate.runs != runs:
+            self._run = waiting.message[RUN_ID_BYTES]
             # a run's frames before its first that passed are as many as its sequence number says, at most
             self.skipped_in_run = min(self._skipped_unseen, frame.sequence)
         self._skipped_unseen = 0

@@ -328,6 +328,8 @@ class ModelWatcher:
         changed = self._metas.news(lanes)
         self._unnoted |= changed
         self._to_choose |= {glove for glove in changed if not self._is_camera(glove)}
+        for lane in lanes:
+            lane.declare_rate((self._metas.of(lane.glove) or {}).get("rate_hz"))
         heard = {lane.glove for lane in lanes if lane.gate.run_id is not None}  # not names with junk only
         self._forget([glove for glove in self._gloves - heard if self._metas.of(glove) is None])
         self._to_choose |= heard - self._gloves

@@ -111,8 +111,7 @@ class PoseLoop:
     def _enqueue(self, arrivals: Iterable[Arrival]) -> None:
         for arrival in arrivals:
             lane = self.gloves.of(arrival.key, arrival.payload, arrival.received_ns)
-            if lane is not None:
-                lane.add(arrival.payload, arrival.received_ns)
+            if lane is not None and lane.add(arrival.payload, arrival.received_ns):
                 self._pending[lane] = None
 
     def _take_turn(self) -> None:

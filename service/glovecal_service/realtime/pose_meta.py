@@ -111,6 +111,8 @@ class PoseMetas:
 ASK_EVERY_S = 2.0
 _ANSWER_WITHIN_S = 0.5
 _CHANGES_ALL_THE_TIME = ("log_from", "log_to")
+CHANGE_EVERY_S = 1.0
+"""Of a glove without frames: each change has its model chosen anew."""
 MOST_GLOVES = 2 * GLOVES_LIMIT
 
 _log = logging.getLogger("glovecal.realtime")
@@ -132,6 +134,7 @@ class GloveMetas:
         self._said: dict[str, RunMetas] = {}
         self._in_force: dict[str, dict[str, Any]] = {}
         self._asked_at: dict[str, float] = {}
+        self._changed_at: dict[str, float] = {}
 
     def of(self, glove: str) -> dict[str, Any] | None:
         """The meta in force."""
@@ -208,16 +211,22 @@ class GloveMetas:
             for glove in [glove for glove in self._said if not self._is_there(glove)]:
                 del self._said[glove]
                 self._in_force.pop(glove, None)
+                self._changed_at.pop(glove, None)
         return len(self._said) < MOST_GLOVES
 
     def _comes_into_force(self, glove: str) -> bool:
         """Put the meta in force that belongs to the glove now; whether that changes anything."""
         said, lane = self._said[glove], self._lanes.get(glove)
         meta = said.newest
-        if lane is not None and clock_ns() - lane.valid_ns <= TAKEOVER_AFTER_NS:
+        streams = lane is not None and clock_ns() - lane.valid_ns <= TAKEOVER_AFTER_NS
+        if streams:
             meta = said.of(self._run_of(glove))
         if meta is None or not _differs(meta, self._in_force.get(glove)):
             return False
+        late_s = time.monotonic() - self._changed_at.get(glove, -CHANGE_EVERY_S)
+        if late_s < CHANGE_EVERY_S and not streams:
+            return False
+        self._changed_at[glove] = time.monotonic()
         self._in_force[glove] = meta
         return True
 

@@ -229,9 +229,10 @@ def _go_on_to(
     standing: CaptureStanding,
     patience: Patience,
 ) -> None:
-    """Fetch what was captured after the last frame known and before the end, capture's clock."""
-    if books.last_wall_ns > end_ns:
-        return
+    """Fetch what was captured after the last frame known and before the end, capture's clock.
+
+    The log tells where that is: the clock of a frame that came over the wire may be anybody's.
+    """
     at = max(books.first, books.last + 1)
     while block := _block(log, books, at, END_OF_RUN, patience):
         for frame in block:
@@ -239,6 +240,8 @@ def _go_on_to(
                 return
             file.add(frame, encode_frame(frame))
         at = block[-1].sequence + 1
+    if books.last_wall_ns > end_ns:
+        return
     if books.run_id == standing.runs[-1].run_id and standing.sequence > books.last:
         if standing.disk_full:
             raise NoAnswer("the capture computer's disk is full: frames wait there to be logged")
