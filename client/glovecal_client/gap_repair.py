@@ -122,11 +122,11 @@ def fetch_digest(
 
 def digest_of(messages: Iterable[bytes]) -> str:
     """Of frames as the log has them (``as_logged``), in order; 64 hexadecimal digits."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for message in messages:
-        found.update(_LENGTH.pack(len(message)))
-        found.update(message)
-    return found.hexdigest()
+        digest.update(_LENGTH.pack(len(message)))
+        digest.update(message)
+    return digest.hexdigest()
 
 
 def as_logged(message: bytes) -> bytes:

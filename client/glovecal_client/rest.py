@@ -69,7 +69,7 @@ class RestClient:
         key: str | None = None,
     ) -> None:
         """``transport`` replaces the network; ``patience_s`` bounds the wait for one answer; ``key``: with
-        which a service that asks is told who this is.
+        which a service that asks is told who this is; by default that of the site's file.
 
         Raises BadName, also for a site's file that cannot be used.
         """
@@ -78,6 +78,8 @@ class RestClient:
             raise BadName(f"{url!r} is not the address of a service; write it like http://127.0.0.1:8600")
         httpx = _import_httpx()
         self._member: Member | None = member_of_environment() if parts.scheme == "https" else None
+        if key is None and self._member is not None:
+            key = self._member.api_key
         self.url: str = url.rstrip("/")
         self.warnings: list[str] = []
         """What answers said in ``Warning`` headers, each once: rows of a list that are damaged."""

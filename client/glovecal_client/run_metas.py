@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-SAID_ONCE = (
+OF_A_RUN = (
     "layout",
     "sensors",
     "context",
@@ -21,7 +21,7 @@ SAID_ONCE = (
     "computer",
 )
 RUNS_KEPT = 4
-_NOT_SAID = (None, "unknown", [])
+_UNKNOWN = (None, "unknown", [])
 _SHOWN = 60
 
 
@@ -54,12 +54,12 @@ class RunMetas:
             self._make_room(keep)
             self._runs[run_id] = dict(meta)
             return True
-        said = {name: earlier[name] for name in SAID_ONCE if earlier.get(name) not in _NOT_SAID}
-        for name, value in said.items():
-            if meta.get(name) not in (*_NOT_SAID, value):
+        fixed = {name: earlier[name] for name in OF_A_RUN if earlier.get(name) not in _UNKNOWN}
+        for name, value in fixed.items():
+            if meta.get(name) not in (*_UNKNOWN, value):
                 self._refuse(run_id, name, value, meta[name])
                 return False
-        self._runs[run_id] = {**meta, **said}
+        self._runs[run_id] = {**meta, **fixed}
         return True
 
     def _make_room(self, keep: str) -> None:

@@ -107,12 +107,12 @@ def reached_endpoints(endpoints: Sequence[str], member: Member) -> list[str]:
     """Where ``member`` connects: as its file says, unless told otherwise; encrypted. Raises BadName."""
     if tuple(endpoints) == (DEFAULT_ENDPOINT,) and member.kind != "service":
         return list(member.zenoh)
-    found = []
+    reached = []
     for endpoint in map(encrypted, endpoints):
         parts = _ENDPOINT.match(endpoint)
         assert parts is not None
-        found.append(f"tls/{_here(parts[2])}{parts[3]}")
-    return found
+        reached.append(f"tls/{_here(parts[2])}{parts[3]}")
+    return reached
 
 
 def _here(host: str) -> str:

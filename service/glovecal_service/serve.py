@@ -46,8 +46,8 @@ from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
-from glovecal_service.site.site_folder import SiteFolder
 from glovecal_service.store.data_folder_lock import DataFolderLock, FolderInUse
+from glovecal_service.store.site.site_folder import SiteFolder
 from glovecal_service.store.store import Store
 
 FIRST_DELAY_S = 0.1
@@ -388,7 +388,7 @@ def web(settings: Settings, stopped: Event, started: Callable[[], None]) -> None
 
     from glovecal_service.rest.app import create_app
     from glovecal_service.rest.http.server import server_config
-    from glovecal_service.site.web_login import WebLogin
+    from glovecal_service.store.site.web_login import WebLogin
 
     app = create_app(settings)
     if settings.studio:

@@ -57,6 +57,8 @@ def layers(package: Path) -> dict[str, set[str]]:
     graph: dict[str, set[str]] = {child: set() for child in children}
     for file in package.rglob("*.py"):
         child = dotted(file)[len(here)]
+        if child not in graph:  # a folder of scripts, no package
+            continue
         for target in imports(file):
             if target[: len(here)] == here and len(target) > len(here):
                 name = target[len(here)]

@@ -28,7 +28,7 @@ from realtime_support import (
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.publishers import Publishers
-from glovecal_client.run_metas import RUNS_KEPT, SAID_ONCE, RunMetas
+from glovecal_client.run_metas import OF_A_RUN, RUNS_KEPT, RunMetas
 from glovecal_client.session import ask_json, open_client, open_router
 from glovecal_service.serve import real_time
 from glovecal_service.settings import Settings
@@ -199,7 +199,7 @@ def test_tokens_come_and_go_and_the_last_words_count() -> None:
 VALUES = st.one_of(
     st.none(), st.booleans(), st.integers(), st.text(max_size=5), st.lists(st.text(max_size=3), max_size=3)
 )
-DOCUMENTS = st.dictionaries(st.sampled_from((*SAID_ONCE, "run_id", "log_to")), VALUES, max_size=6)
+DOCUMENTS = st.dictionaries(st.sampled_from((*OF_A_RUN, "run_id", "log_to")), VALUES, max_size=6)
 
 
 @hypothesis_settings(max_examples=200, deadline=None)
@@ -213,7 +213,7 @@ def test_whatever_is_said_a_run_never_changes_its_mind(documents: list[dict[str,
         said.refused += not taken
         after = metas.of(run_id)
         assert after is not None
-        for name in SAID_ONCE:
+        for name in OF_A_RUN:
             if before is not None and before.get(name) not in (None, "unknown", []):
                 assert after[name] == before[name]
     assert metas.refused == said.refused

@@ -214,6 +214,6 @@ class LogQueries:
         return _digest(found, reply) if asked[4] else reply
 
 
-def _digest(found: list[bytes], reply: bytes) -> bytes:
-    ends = {"first": frame_sequence(found[0]), "last": frame_sequence(found[-1])} if found else {}
-    return json.dumps({"frames": len(found), **ends, "sha256": hashlib.sha256(reply).hexdigest()}).encode()
+def _digest(frames: list[bytes], reply: bytes) -> bytes:
+    ends = {"first": frame_sequence(frames[0]), "last": frame_sequence(frames[-1])} if frames else {}
+    return json.dumps({"frames": len(frames), **ends, "sha256": hashlib.sha256(reply).hexdigest()}).encode()

@@ -44,16 +44,16 @@ def check_certificate(member: Member) -> CertificateFacts:
         client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         client.check_hostname, client.verify_mode = False, ssl.CERT_NONE
         load_key(client, member)
-        found = _shake_hands(client, peer)
+        seen = _shake_hands(client, peer)
     except ssl.SSLCertVerificationError as error:
         raise NotAdmitted(f"{whose} {why_unverified(error)}") from error
     except (ssl.SSLError, ValueError) as error:
         raise BadSiteFile(f"{whose} cannot be used: it and its private key do not fit together") from error
     return CertificateFacts(
-        _common_name(found),
-        _time(str(found["notBefore"])),
-        _time(str(found["notAfter"])),
-        tuple(str(name) for _, name in found.get("subjectAltName", ())),
+        _common_name(seen),
+        _time(str(seen["notBefore"])),
+        _time(str(seen["notAfter"])),
+        tuple(str(name) for _, name in seen.get("subjectAltName", ())),
     )
 
 
@@ -117,8 +117,8 @@ def _shake_hands(client: ssl.SSLContext, server: ssl.SSLContext) -> dict[str, An
     return server_end.getpeercert() or {}
 
 
-def _common_name(found: dict[str, Any]) -> str:
-    names = [value for part in found.get("subject", ()) for name, value in part if name == "commonName"]
+def _common_name(seen: dict[str, Any]) -> str:
+    names = [value for part in seen.get("subject", ()) for name, value in part if name == "commonName"]
     return names[0] if names else ""
 
 

@@ -116,38 +116,38 @@ class _Wrong(Exception):
     """What is wrong with a field."""
 
 
-def _member(found: Any) -> Member:
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+def _member(document: Any) -> Member:
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise _Wrong(f"there is no field 'format' with {FORMAT!r}")
-    kind, role = found.get("kind"), found.get("role")
+    kind, role = document.get("kind"), document.get("role")
     if kind not in KINDS:
         raise _Wrong(f"its kind is {_shown(kind)}, not one of {', '.join(KINDS)}")
     if role is not None and role not in ROLES:
         raise _Wrong(f"its role is {_shown(role)}, not one of {', '.join(ROLES)}")
     return Member(
-        site=check_identifier(_text(found, "site"), "site"),
-        name=check_identifier(_text(found, "name"), "member"),
+        site=check_identifier(_text(document, "site"), "site"),
+        name=check_identifier(_text(document, "name"), "member"),
         kind=kind,
-        zenoh=tuple(_matching(each, ENDPOINT, "zenoh") for each in _texts(found, "zenoh")),
-        rest=_matching(_text(found, "rest"), REST_ADDRESS, "rest"),
-        authority=_matching(_text(found, "authority"), _PEM, "authority"),
-        certificate=_matching(_text(found, "certificate"), _PEM, "certificate"),
-        private_key=_matching(_text(found, "private_key"), _PEM, "private_key"),
-        gloves=tuple(check_identifier(each, "glove") for each in _texts(found, "gloves", fewest=0)),
+        zenoh=tuple(_matching(each, ENDPOINT, "zenoh") for each in _texts(document, "zenoh")),
+        rest=_matching(_text(document, "rest"), REST_ADDRESS, "rest"),
+        authority=_matching(_text(document, "authority"), _PEM, "authority"),
+        certificate=_matching(_text(document, "certificate"), _PEM, "certificate"),
+        private_key=_matching(_text(document, "private_key"), _PEM, "private_key"),
+        gloves=tuple(check_identifier(each, "glove") for each in _texts(document, "gloves", fewest=0)),
         role=role,
-        api_key=None if found.get("api_key") is None else _text(found, "api_key"),
+        api_key=None if document.get("api_key") is None else _text(document, "api_key"),
     )
 
 
-def _text(found: dict[str, Any], name: str) -> str:
-    value = found.get(name)
+def _text(document: dict[str, Any], name: str) -> str:
+    value = document.get(name)
     if not isinstance(value, str):
         raise _Wrong(f"its field {name!r} is no text")
     return value
 
 
-def _texts(found: dict[str, Any], name: str, *, fewest: int = 1) -> list[str]:
-    values = found.get(name)
+def _texts(document: dict[str, Any], name: str, *, fewest: int = 1) -> list[str]:
+    values = document.get(name)
     if not isinstance(values, list) or not fewest <= len(values) <= MOST_ADDRESSES:
         raise _Wrong(f"its field {name!r} is no list of {fewest} to {MOST_ADDRESSES} texts")
     if not all(isinstance(value, str) for value in values):

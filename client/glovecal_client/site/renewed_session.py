@@ -41,13 +41,13 @@ class RenewedSession:
         """A file that cannot be used is left alone: the certificate in use may be good for long."""
         before = self._member
         try:
-            found = read_member(file)
-            if found == before:
+            renewed = read_member(file)
+            if renewed == before:
                 return
-            check_certificate(found)
-            self._member = found
+            check_certificate(renewed)
+            self._member = renewed
             self.session.reopen()
-            _log.info("the renewed certificate of %s is in use", found.name)
+            _log.info("the renewed certificate of %s is in use", renewed.name)
         except ClientError as error:
             _log.debug("the site's file: %s", error)
         except zenoh.ZError:

@@ -140,13 +140,13 @@ def _keys(site: str, kind: Kind, gloves: Sequence[str]) -> dict[tuple[str, str],
     """Key expressions by flow and message."""
     if kind == "service":
         return {(flow, message): {"**"} for flow in (_IN, _OUT) for message in _ALL_MESSAGES}
-    found: dict[tuple[str, str], set[str]] = {}
+    keys: dict[tuple[str, str], set[str]] = {}
     for plane, row in TABLE.items():
         for action in row.get(kind, ()):
             for way in _MESSAGES[action]:
                 named = ("*",) if way in _OF_ANY_GLOVE or not gloves else gloves
-                found.setdefault(way, set()).update(f"{ROOT}/{site}/{glove}/{plane}" for glove in named)
-    if found:
+                keys.setdefault(way, set()).update(f"{ROOT}/{site}/{glove}/{plane}" for glove in named)
+    if keys:
         for way in _MESSAGES["see"]:
-            found.setdefault(way, set()).add(admission_key(site))
-    return found
+            keys.setdefault(way, set()).add(admission_key(site))
+    return keys

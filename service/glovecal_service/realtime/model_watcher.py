@@ -73,7 +73,7 @@ def choose(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: P
 def _chosen(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: Prepared) -> Serving:
     """As ``choose``; the hand as far as the glove or the model says it, and no skeleton."""
     try:
-        record = store.gloves.as_said(glove, meta)
+        record = store.gloves.with_meta(glove, meta)
     except BadInput as error:
         return Serving(sentence=str(error))
     subject, layout = record.subject, record.layout
@@ -328,8 +328,8 @@ class ModelWatcher:
         changed = self._metas.news(lanes)
         self._unnoted |= changed
         self._to_choose |= {glove for glove in changed if not self._is_camera(glove)}
-        for lane in lanes:
-            lane.declare_rate((self._metas.of(lane.glove) or {}).get("rate_hz"))
+        for each in lanes:
+            each.declare_rate((self._metas.of(each.glove) or {}).get("rate_hz"))
         heard = {lane.glove for lane in lanes if lane.gate.run_id is not None}  # not names with junk only
         self._forget([glove for glove in self._gloves - heard if self._metas.of(glove) is None])
         self._to_choose |= heard - self._gloves

@@ -131,7 +131,7 @@ class GloveMetas:
         self._publishers = publishers
         self._documents = Documents(session, site, "meta")
         self._lanes: dict[str, GlovePipeline] = {}
-        self._said: dict[str, RunMetas] = {}
+        self._runs_of: dict[str, RunMetas] = {}
         self._in_force: dict[str, dict[str, Any]] = {}
         self._asked_at: dict[str, float] = {}
         self._changed_at: dict[str, float] = {}
@@ -154,11 +154,11 @@ class GloveMetas:
 
     def warnings(self, glove: str) -> list[dict[str, str]]:
         """That somebody else spoke for the run that is in force, as JSON."""
-        said = self._said.get(glove)
-        if said is None or not said.refused or said.contradicted != self._run_of(glove):
+        metas = self._runs_of.get(glove)
+        if metas is None or not metas.refused or metas.contradicted != self._run_of(glove):
             return []
-        times = "once" if said.refused == 1 else f"{said.refused} times"
-        sentence = f"{said.sentence[0].upper()}{said.sentence[1:]} ({times})."
+        times = "once" if metas.refused == 1 else f"{metas.refused} times"
+        sentence = f"{metas.sentence[0].upper()}{metas.sentence[1:]} ({times})."
         return [{"part": "publisher", "sentence": sentence, "advice": _STOP_ONE}]
 
     def forget(self, glove: str) -> None:
@@ -172,7 +172,7 @@ class GloveMetas:
             self._note(document.glove, document.content)
         for glove in [glove for glove in self._lanes if self._is_unknown(glove)]:
             self.ask(glove)
-        return {glove for glove in self._said if self._comes_into_force(glove)}
+        return {glove for glove in self._runs_of if self._comes_into_force(glove)}
 
     def ask(self, glove: str = "*") -> None:
         """Ask one glove, or all, for its meta."""
@@ -189,38 +189,38 @@ class GloveMetas:
         return glove in self._lanes or self._publishers.has(glove)
 
     def _run_of(self, glove: str) -> str:
-        lane = self._lanes.get(glove)
-        run_id = None if lane is None else lane.gate.run_id
+        stream = self._lanes.get(glove)
+        run_id = None if stream is None else stream.gate.run_id
         return "" if run_id is None else f"{run_id:016x}"
 
     def _is_unknown(self, glove: str) -> bool:
-        said = self._said.get(glove)
-        known = said is not None and said.of(self._run_of(glove)) is not None
+        metas = self._runs_of.get(glove)
+        known = metas is not None and metas.of(self._run_of(glove)) is not None
         return not known and time.monotonic() - self._asked_at.get(glove, -ASK_EVERY_S) >= ASK_EVERY_S
 
     def _note(self, glove: str, meta: dict[str, Any]) -> None:
-        if not meta or (glove not in self._said and not self._has_room()):
+        if not meta or (glove not in self._runs_of and not self._has_room()):
             return
-        said = self._said.setdefault(glove, RunMetas())
-        is_first = said.contradicted != meta.get("run_id")
-        if not said.note(meta, keep=self._run_of(glove)) and is_first:
-            _log.warning("glove %s: %s. %s", glove, said.sentence, _STOP_ONE)
+        metas = self._runs_of.setdefault(glove, RunMetas())
+        is_first = metas.contradicted != meta.get("run_id")
+        if not metas.note(meta, keep=self._run_of(glove)) and is_first:
+            _log.warning("glove %s: %s. %s", glove, metas.sentence, _STOP_ONE)
 
     def _has_room(self) -> bool:
-        if len(self._said) >= MOST_GLOVES:
-            for glove in [glove for glove in self._said if not self._is_there(glove)]:
-                del self._said[glove]
+        if len(self._runs_of) >= MOST_GLOVES:
+            for glove in [glove for glove in self._runs_of if not self._is_there(glove)]:
+                del self._runs_of[glove]
                 self._in_force.pop(glove, None)
                 self._changed_at.pop(glove, None)
-        return len(self._said) < MOST_GLOVES
+        return len(self._runs_of) < MOST_GLOVES
 
     def _comes_into_force(self, glove: str) -> bool:
         """Put the meta in force that belongs to the glove now; whether that changes anything."""
-        said, lane = self._said[glove], self._lanes.get(glove)
-        meta = said.newest
-        streams = lane is not None and clock_ns() - lane.valid_ns <= TAKEOVER_AFTER_NS
+        metas, stream = self._runs_of[glove], self._lanes.get(glove)
+        meta = metas.newest
+        streams = stream is not None and clock_ns() - stream.valid_ns <= TAKEOVER_AFTER_NS
         if streams:
-            meta = said.of(self._run_of(glove))
+            meta = metas.of(self._run_of(glove))
         if meta is None or not _differs(meta, self._in_force.get(glove)):
             return False
         late_s = time.monotonic() - self._changed_at.get(glove, -CHANGE_EVERY_S)

@@ -26,7 +26,7 @@ from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas
 from glovecal_service.realtime.served_model import ServedModels
 from glovecal_service.realtime.service_status import ServiceStatus
 from glovecal_service.settings import Settings
-from glovecal_service.site.router import SiteRouter, service_router
+from glovecal_service.store.site.router import SiteRouter, service_router
 from glovecal_service.store.store import Store
 
 GIL_SWITCH_S = 0.0005

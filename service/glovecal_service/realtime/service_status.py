@@ -37,14 +37,14 @@ class _Glove:
     first: Place
     of_runs: dict[int, deque[Place]] = field(default_factory=dict)
     """The newest reports of each run, at most ``_RUNS``."""
-    heard: set[int] = field(default_factory=set)
+    streaming: set[int] = field(default_factory=set)
     """Runs whose frames came: reports on others make room."""
     ended: dict[int, int] = field(default_factory=dict)
     """Frames missing after the last one that came of runs that are over, by run."""
 
     def note(self, report: Place) -> None:
         if report.run_id not in self.of_runs and len(self.of_runs) >= _RUNS:
-            del self.of_runs[next(run for run in self.of_runs if run not in self.heard)]
+            del self.of_runs[next(run for run in self.of_runs if run not in self.streaming)]
         self.of_runs.setdefault(report.run_id, deque(maxlen=_REPORTS)).append(report)
 
     def newest_of_all(self, before_ns: int, standing: Standing | None) -> Place | None:
@@ -84,7 +84,7 @@ class CaptureReports:
             before_ns = clock_ns() - SETTLED_AFTER_NS
             if standing is not None:
                 ended = {standing.ended.run_id} if standing.ended is not None else set()
-                known.heard = {standing.newest.run_id} | ended
+                known.streaming = {standing.newest.run_id} | ended
             settled = known.newest_of_all(before_ns, standing)
             if standing is None:
                 return 0 if settled is None else _possible(settled.sequence, known.first, settled) - received
@@ -103,15 +103,15 @@ class CaptureReports:
         for document in self._documents.take(self._publishers.has):
             self._note(document)
 
-    def _note(self, heard: Document) -> None:
-        glove, document = heard.glove, heard.content
+    def _note(self, reported: Document) -> None:
+        glove, document = reported.glove, reported.content
         try:
             sequence = document["sequence"]
             run_id, sequence = int(document["run_id"], 16), -1 if sequence is None else int(sequence)
             wall_ns = int(document.get("wall_ns") or 0)
         except (KeyError, TypeError, ValueError, OverflowError):
             return
-        report = Place(run_id, sequence, heard.received_ns, wall_ns)
+        report = Place(run_id, sequence, reported.received_ns, wall_ns)
         if glove in self._gloves or len(self._gloves) < 2 * GLOVES_LIMIT:
             self._gloves.setdefault(glove, _Glove(report)).note(report)
 
@@ -218,8 +218,8 @@ class ServiceStatus:
         metas = self._pose_metas.documents()
         unheard = self._reports.unheard
         lanes = {lane.glove: lane.status(unheard) for lane in self._gloves.all()}
-        for glove, lane in lanes.items():
-            lane["warnings"] = [*self._metas.warnings(glove), *lane["warnings"]]
+        for glove, status in lanes.items():
+            status["warnings"] = [*self._metas.warnings(glove), *status["warnings"]]
         gloves = {
             glove: {
                 **(lanes.get(glove) or _nothing_received(unheard(glove, None, 0))),

@@ -38,30 +38,32 @@ class Comparison:
     Its disk was full, or the log is damaged."""
 
 
-def reconcile_and_compare(file: RunLedger, log: Log, stop_wall_ns: int | None, patience: Patience) -> Outcome:
+def reconcile_and_compare(
+    file: RunLedger, log: Log, stop_wall_ns: int | None, time_left: Patience
+) -> Outcome:
     """As ``reconcile``; then what is recorded is compared with the log, and what it lacks then is fetched."""
-    outcome = reconcile(file, log, stop_wall_ns, patience)
+    outcome = reconcile(file, log, stop_wall_ns, time_left)
     if not outcome.complete:
         return outcome
     for _ in range(ROUNDS):
         try:
-            found = compare(file, log, patience)
+            comparison = compare(file, log, time_left)
         except QueryRefused as error:
             return replace(outcome, not_compared=reason_of(error))
         except (NoAnswer, WireError, zenoh.ZError) as error:
             return replace(outcome, not_compared=reason_of(error), may_be_compared=True)
         except OutOfTime:
             return replace(outcome, not_compared="the capture log has more to tell", may_be_compared=True)
-        why = f"{found.not_logged} frames are not in it" if found.not_logged else ""
-        if not found.taken_out:
+        why = f"{comparison.not_logged} frames are not in it" if comparison.not_logged else ""
+        if not comparison.taken_out:
             return replace(outcome, not_compared=why)
-        outcome = reconcile(file, log, stop_wall_ns, patience)
+        outcome = reconcile(file, log, stop_wall_ns, time_left)
         if not outcome.complete:
             return outcome
     return replace(outcome, not_compared="the capture log tells something else each time")
 
 
-def compare(file: RunLedger, log: Log, patience: Patience) -> Comparison:
+def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
     """Hold every frame of ``file`` against the capture log, and take out what is not from there.
 
     Raises NoAnswer, WireError, OutOfTime; QueryRefused where a run has no log, when all others were compared.
@@ -71,7 +73,7 @@ def compare(file: RunLedger, log: Log, patience: Patience) -> Comparison:
     not_logged = 0
     for run_id, frames in file.recorded().items():
         try:
-            strange, unknown = _compared(run_id, frames, log, patience)
+            strange, unknown = _compared(run_id, frames, log, time_left)
         except QueryRefused as error:
             refused = error
             continue
@@ -89,14 +91,14 @@ def compare(file: RunLedger, log: Log, patience: Patience) -> Comparison:
 
 
 def _compared(
-    run_id: int, frames: RecordedFrames, log: Log, patience: Patience
+    run_id: int, frames: RecordedFrames, log: Log, time_left: Patience
 ) -> tuple[list[int], list[int]]:
     """Numbers of frames that differ from the log's, and of those that the log does not have."""
     strange: list[int] = []
     unknown: list[int] = []
     at, last = 0, int(frames.sequences[-1])
     while at < len(frames):
-        if patience.is_over:
+        if time_left.is_over:
             raise OutOfTime
         first = int(frames.sequences[at])
         digest = _digest(log, run_id, first, last)
@@ -109,14 +111,14 @@ def _compared(
         rows = slice(at, until)
         messages = frames.messages(rows)
         if digest.frames != len(messages) or digest.sha256 != digest_of(messages):
-            logged = _logged(log, run_id, first, digest.last, patience)
+            logged = _logged(log, run_id, first, digest.last, time_left)
             for sequence, message in zip(frames.sequences[rows].tolist(), messages, strict=True):
                 if sequence not in logged:
                     unknown.append(sequence)
                 elif logged[sequence] != message:
                     strange.append(sequence)
         at = until
-        patience.wait(PAUSE_S)
+        time_left.wait(PAUSE_S)
     return strange, unknown
 
 
@@ -129,11 +131,11 @@ def _digest(log: Log, run_id: int, first: int, last: int) -> BlockDigest | None:
         return BlockDigest(-1, block[0].sequence, block[-1].sequence, "") if block else None
 
 
-def _logged(log: Log, run_id: int, first: int, last: int, patience: Patience) -> dict[int, bytes]:
-    found: dict[int, bytes] = {}
+def _logged(log: Log, run_id: int, first: int, last: int, time_left: Patience) -> dict[int, bytes]:
+    frames: dict[int, bytes] = {}
     while first <= last and (block := log.block(run_id, first, last)):
-        found |= {frame.sequence: as_logged(encode_frame(frame)) for frame in block}
+        frames |= {frame.sequence: as_logged(encode_frame(frame)) for frame in block}
         first = block[-1].sequence + 1
-        if patience.is_over:
+        if time_left.is_over:
             raise OutOfTime
-    return found
+    return frames

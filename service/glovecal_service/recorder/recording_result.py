@@ -193,13 +193,13 @@ def _sentence(record: RecordingRecord, settlement: Settlement) -> str:
     if not settlement.outcome.complete:
         pending = f"{account['pending_frames']} still to be fetched from the capture log"
         return f"incomplete, repairing: {counts}, {pending}; {why}"
-    told = [f"{counts}, {account['missing_frames']} missing"]
-    told += [f"the capture log cannot tell of all: {why}"] if why else []
-    out, doubt = account[TAKEN_OUT], settlement.outcome.not_compared
-    told += [f"{out} frames were not the capture's and were taken out"] if out else []
-    told += [f"not compared with the capture log{_yet(settlement)}: {doubt}"] if doubt else []
-    told += [record.facts[ENDED_BY]] if ENDED_BY in record.facts else []
-    return "; ".join(told)
+    parts = [f"{counts}, {account['missing_frames']} missing"]
+    parts += [f"the capture log cannot tell of all: {why}"] if why else []
+    out, why_not = account[TAKEN_OUT], settlement.outcome.not_compared
+    parts += [f"{out} frames were not the capture's and were taken out"] if out else []
+    parts += [f"not compared with the capture log{_yet(settlement)}: {why_not}"] if why_not else []
+    parts += [record.facts[ENDED_BY]] if ENDED_BY in record.facts else []
+    return "; ".join(parts)
 
 
 def _yet(settlement: Settlement) -> str:

@@ -109,26 +109,26 @@ class RunLedger:
 
     def findings(self) -> dict[str, dict[str, Any]]:
         """By run, 16 hexadecimal digits: what is to be known when the file is resumed, or read."""
-        found: dict[str, dict[str, Any]] = {}
+        of_runs: dict[str, dict[str, Any]] = {}
         for run_id, out in self.taken_out.items():
             if not out:
                 continue
-            found.setdefault(f"{run_id:016x}", {})[TAKEN_OUT] = [list(gap) for gap in out]
+            of_runs.setdefault(f"{run_id:016x}", {})[TAKEN_OUT] = [list(gap) for gap in out]
         for run_id, sequence in self.reached.items():
-            found.setdefault(f"{run_id:016x}", {})[REACHED] = sequence
-        return found
+            of_runs.setdefault(f"{run_id:016x}", {})[REACHED] = sequence
+        return of_runs
 
     def recorded(self) -> dict[int, RecordedFrames]:
         """The frames in the file by run, without those that were taken out."""
-        found: dict[int, tuple[array[int], array[int], array[int]]] = {}
+        of_runs: dict[int, tuple[array[int], array[int], array[int]]] = {}
         for place, message in Recording.open(self.path).places():
             run_id, sequence = frame_run_id(message), frame_sequence(message)
             out = self.taken_out.get(run_id)
             if out is None or sequence not in out or as_logged(message) is not message:
-                columns = found.setdefault(run_id, (array("Q"), array("Q"), array("Q")))
+                columns = of_runs.setdefault(run_id, (array("Q"), array("Q"), array("Q")))
                 for column, value in zip(columns, (sequence, place, len(message)), strict=True):
                     column.append(value)
-        return {run_id: RecordedFrames(self.path, *columns) for run_id, columns in found.items()}
+        return {run_id: RecordedFrames(self.path, *columns) for run_id, columns in of_runs.items()}
 
     @property
     def path(self) -> Path:
@@ -260,7 +260,7 @@ class RunLedger:
 
 def frames_taken_out(findings: Mapping[str, Mapping[str, Any]]) -> dict[int, SequenceRanges]:
     """By run."""
-    return {int(run, 16): SequenceRanges.of(found.get(TAKEN_OUT, ())) for run, found in findings.items()}
+    return {int(run, 16): SequenceRanges.of(finding.get(TAKEN_OUT, ())) for run, finding in findings.items()}
 
 
 def usable_frames(recording: Recording, taken_out: Mapping[int, SequenceRanges]) -> Iterator[Frame]:
@@ -285,12 +285,12 @@ class RecordedFrames:
 
     def messages(self, rows: slice) -> list[bytes]:
         """As they lie in the capture log, if they are from there. Raises OSError."""
-        found = []
+        messages = []
         with self._path.open("rb") as file:
             for place, length in zip(self._places[rows].tolist(), self._lengths[rows].tolist(), strict=True):
                 file.seek(place)
-                found.append(as_logged(file.read(length)))
-        return found
+                messages.append(as_logged(file.read(length)))
+        return messages
 
 
 def _earlier(frame: Frame, other: Frame | None) -> Frame:

@@ -74,8 +74,8 @@ from glovecal_service.rest.take import (
     videos,
 )
 from glovecal_service.settings import Settings
-from glovecal_service.site.web_login import AllowedHosts
 from glovecal_service.store.retention import sweep
+from glovecal_service.store.site.web_login import AllowedHosts
 from glovecal_service.store.store import Store
 
 JSON_LIMIT_BYTES = 8_000_000

@@ -51,17 +51,17 @@ class Gloves:
                     grow_revision(connection)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
-    def as_said(self, glove: str, meta: Mapping[str, Any] | None) -> GloveRecord:
+    def with_meta(self, glove: str, meta: Mapping[str, Any] | None) -> GloveRecord:
         """The glove as ``seen`` would leave it, but nothing is stored; without a meta as it is. Raises
         BadInput."""
-        said = _said(check_identifier(glove, "glove"), meta) if meta else {}
+        changes = _said(check_identifier(glove, "glove"), meta) if meta else {}
         with self._database.read() as connection:
             earlier = _find(connection, glove)
             stored = {} if earlier is None else sound_row(tables.gloves, earlier)
-        if said and earlier is not None:
-            _keep_chosen_wearer(said, earlier)
+        if changes and earlier is not None:
+            _keep_chosen_wearer(changes, earlier)
         nothing = dict.fromkeys(("layout", "subject", "wearing", "assigned_at", "latency"))
-        return _record({**nothing, **_unseen(glove, now()), **stored, **said})
+        return _record({**nothing, **_unseen(glove, now()), **stored, **changes})
 
     def remove(self, name: str) -> None:
         """Forget the glove and who wears it; its takes and recordings stay. Raises NotFound, Conflict while

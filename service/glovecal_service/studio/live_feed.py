@@ -174,7 +174,7 @@ class LiveFeeds:
     def _believe(self) -> None:
         for glove, runs in self._heard.copy().items():
             if self._publishers is not None and self._publishers.has(glove):
-                newest = max(runs.copy().values(), key=lambda said: said[0])
+                newest = max(runs.copy().values(), key=lambda each: each[0])
                 self._statuses[glove] = runs.get(self._run_of(glove), newest)
 
     def _run_of(self, glove: str) -> str:

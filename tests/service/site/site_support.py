@@ -17,8 +17,8 @@ from glovecal_client.session import client_config
 from glovecal_client.site.member import Member, read_member
 from glovecal_client.site.rules import Rules
 from glovecal_service.settings import Settings
-from glovecal_service.site.router import SiteRouter
-from glovecal_service.site.site_folder import SiteFolder
+from glovecal_service.store.site.router import SiteRouter
+from glovecal_service.store.site.site_folder import SiteFolder
 
 BOUND = ("right",)
 

@@ -17,8 +17,8 @@ from glovecal_client.session import open_client, open_router
 from glovecal_client.site.certificates import check_certificate
 from glovecal_client.site.member import BadSiteFile, Member, read_member
 from glovecal_models.errors import BadInput
-from glovecal_service.site.authority import CLOCKS_APART
-from glovecal_service.site.site_folder import SiteFolder
+from glovecal_service.store.site.authority import CLOCKS_APART
+from glovecal_service.store.site.site_folder import SiteFolder
 
 POSE = "glovecal/lab/right/pose"
 

@@ -1,4 +1,4 @@
-"""``glovecal serve`` of a site: nothing beyond loopback without certificates, with them everything over TLS."""
+"""``glovecal serve`` of a site: no step beyond loopback without certificates, with them TLS everywhere."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     served = Served(tmp_path_factory.mktemp("served"))
     assert served.run("site", "init", "--host", "lab.example").returncode == 0
     assert served.run("site", "add", "watcher", "--as", "viewer", "--role", "viewer").returncode == 0
+    assert served.run("site", "add", "boss", "--as", "viewer", "--role", "admin").returncode == 0
     service = str(served.place / "data" / "site" / "service.glovecal")
     process = subprocess.Popen(
         [*GLOVECAL, "serve", "--no-studio"],
@@ -86,7 +87,10 @@ def test_rest_is_encrypted_and_answers_to_its_names_alone(
 ) -> None:
     watcher = read_member(served.place / "watcher.glovecal")
     url = f"https://127.0.0.1:{served.port}"
-    with httpx.Client(verify=client_context(watcher), base_url=url, trust_env=False) as http:
+    verified = httpx.Client(verify=client_context(watcher), base_url=url, trust_env=False)
+    with verified as http:
+        assert http.get("/v1/subjects").status_code == 401, "its certificate is no key"
+        http.headers["Authorization"] = f"Bearer {watcher.api_key}"
         for host, status in (
             ("lab.example", 200), ("LAB.example:8600", 200), ("127.0.0.1", 200), ("evil.example", 421),
         ):  # fmt: skip

@@ -13,7 +13,7 @@ from site_support import Heard, Site, answered, eventually, tokens
 
 from glovecal_client.keys import PLANES
 from glovecal_client.site.member import read_member
-from glovecal_service.site.site_folder import SiteFolder
+from glovecal_service.store.site.site_folder import SiteFolder
 
 EXPECTED = """
 plane         | capture                   | viewer        | worker

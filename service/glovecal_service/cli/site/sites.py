@@ -17,7 +17,7 @@ from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.cli.terminal.options import AsJson, identifier
 from glovecal_service.cli.terminal.printing import Refusal, out, print_json, print_table, sentence_of
 from glovecal_service.settings import Settings
-from glovecal_service.site.site_folder import Row, SiteFolder
+from glovecal_service.store.site.site_folder import Row, SiteFolder
 
 app = typer.Typer(help="Several computers: who belongs to the site.", no_args_is_help=True)
 
@@ -65,18 +65,21 @@ def add(
         list[str] | None,
         typer.Option("--glove", help="Of a capture: the only gloves it may publish; repeatable."),
     ] = None,
-    role: Annotated[Role | None, typer.Option("--role", help="Its role over REST.")] = None,
+    role: Annotated[
+        Role | None,
+        typer.Option("--role", help="Its role over REST: a key of its name is made and put into the file."),
+    ] = None,
     to: To = None,
     days: Days = 397,
     authority_key: AuthorityKey = None,
 ) -> None:
     """Make the file of a new member: copy it to that computer and name it in GLOVECAL_SITE_FILE there."""
-    _, folder = _place()
+    settings, folder = _place()
     place = to or Path(f"{name}.glovecal")
     if place.exists():
         raise Refusal(f"{place} exists already; move it away, or choose another file with --to")
     member = folder.add(name, kind, gloves=glove or (), role=role, key=authority_key, days=days)
-    _write(place, member)
+    _write(place, member, api_key=None if role is None else _key(settings, name, role))
     bound = f", gloves {', '.join(member.gloves)}" if member.gloves else ""
     out.print(
         f"Wrote {place}: {name}, {kind}{bound}. It holds a private key: copy it to that computer only, "
@@ -100,8 +103,9 @@ def list_members(as_json: AsJson = False) -> None:
 @app.command("revoke")
 def revoke(name: Name) -> None:
     """Let a member do nothing any more. A running service knows within a second."""
-    _, folder = _place()
+    settings, folder = _place()
     folder.revoke(name)
+    _revoke_key(settings, name)
     out.print(f"Revoked {name}. To let that computer in again, make it a new file: glovecal site add {name}")
 
 
@@ -139,6 +143,22 @@ def _place() -> tuple[Settings, SiteFolder]:
     return settings, SiteFolder(settings.data)
 
 
+def _key(settings: Settings, name: str, role: Role) -> str:
+    from glovecal_service.store.store import Store
+
+    with Store.open(settings) as store:
+        return store.keys.create(name, role)[1]
+
+
+def _revoke_key(settings: Settings, name: str) -> None:
+    """The member's own, if it has one."""
+    from glovecal_service.store.store import Store
+
+    with Store.open(settings) as store:
+        if any(key.name == name and key.is_valid for key in store.keys.list()):
+            store.keys.revoke(name)
+
+
 def _zenoh_port(settings: Settings) -> int:
     port = settings.zenoh.rpartition(":")[2]
     if not port.isdecimal():
@@ -149,11 +169,11 @@ def _zenoh_port(settings: Settings) -> int:
 def _write(place: Path, member: Member, *, api_key: str | None = None) -> None:
     from dataclasses import replace
 
-    beside = place.with_name(f".{place.name}.new")
+    unfinished = place.with_name(f".{place.name}.new")
     try:
-        with open(beside, "w", encoding="utf-8", opener=open_private) as file:
+        with open(unfinished, "w", encoding="utf-8", opener=open_private) as file:
             file.write(replace(member, api_key=api_key).document())
-        os.replace(beside, place)
+        os.replace(unfinished, place)
     except OSError as error:
         raise Refusal(
             f"{place} cannot be written ({sentence_of(error)}); glovecal site renew {member.name} --to FILE "

@@ -75,7 +75,7 @@ def _own(page: str) -> str:
     return page if page.startswith(f"/{STUDIO}") and "//" not in page and "\\" not in page else f"/{STUDIO}"
 
 
-def _page(said: str, page: str, status: int) -> HTMLResponse:
-    text = _PAGE.replace("SAID", escape(said)).replace("PAGE", escape(_own(page), quote=True))
+def _page(sentence: str, page: str, status: int) -> HTMLResponse:
+    text = _PAGE.replace("SAID", escape(sentence)).replace("PAGE", escape(_own(page), quote=True))
     headers = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store"}
     return HTMLResponse(text, status_code=status, headers=headers)

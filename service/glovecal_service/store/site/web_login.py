@@ -51,12 +51,12 @@ class WebLogin:
         """Until ``stopped``: connections from now on are shown the certificate that is in the file then."""
         while not stopped.wait(LOOK_EVERY_S):
             try:
-                found = read_member(self._file)
-                if found != self._member:
-                    check_certificate(found)
-                    self._member = found
-                    load_key(self.context, found)
-                    self._hosts.take_from(found)
+                renewed = read_member(self._file)
+                if renewed != self._member:
+                    check_certificate(renewed)
+                    self._member = renewed
+                    load_key(self.context, renewed)
+                    self._hosts.take_from(renewed)
                     _log.info("REST shows the renewed certificate")
             except (ClientError, OSError, ssl.SSLError) as error:
                 _log.debug("the site's file: %s", error)

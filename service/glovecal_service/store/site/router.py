@@ -23,7 +23,7 @@ from glovecal_client.site.member import Member, read_member
 from glovecal_client.site.rules import Admitted, Rules
 from glovecal_models.errors import BadInput
 from glovecal_service.settings import Settings
-from glovecal_service.site.site_folder import SiteFolder
+from glovecal_service.store.site.site_folder import SiteFolder
 
 LOOK_EVERY_S = 0.5
 _log = logging.getLogger("glovecal.site")

@@ -22,8 +22,8 @@ from glovecal_client.site.roles import Role
 from glovecal_client.site.rules import Admitted, common_name
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
-from glovecal_service.site.authority import MEMBER_DAYS, Authority, Issued, general_name
 from glovecal_service.store.blobs import write_durably
+from glovecal_service.store.site.authority import MEMBER_DAYS, Authority, Issued, general_name
 
 FOLDER = "site"
 AUTHORITY, AUTHORITY_KEY, SERVICE_FILE = "authority.pem", "authority.key", "service.glovecal"
@@ -118,8 +118,8 @@ class SiteFolder:
     def register(self) -> Register:
         """Raises BadInput where there is no site, or its list of members cannot be read."""
         try:
-            found = json.loads(self.members_file.read_bytes())
-            return _register(found)
+            document = json.loads(self.members_file.read_bytes())
+            return _register(document)
         except FileNotFoundError as error:
             raise BadInput(
                 f"there is no site in {self.folder}; make one with `glovecal site init`"
@@ -299,21 +299,21 @@ def _in_address(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _register(found: Any) -> Register:
+def _register(document: Any) -> Register:
     """Raises ValueError, KeyError or TypeError."""
-    if found["format"] != FORMAT:
-        raise ValueError(found["format"])
+    if document["format"] != FORMAT:
+        raise ValueError(document["format"])
     return Register(
-        str(found["site"]),
-        tuple(map(str, found["hosts"])),
-        tuple(map(str, found["zenoh"])),
-        str(found["rest"]),
-        tuple(_row(each) for each in found["members"]),
+        str(document["site"]),
+        tuple(map(str, document["hosts"])),
+        tuple(map(str, document["zenoh"])),
+        str(document["rest"]),
+        tuple(_row(each) for each in document["members"]),
     )
 
 
-def _row(found: dict[str, Any]) -> Row:
-    given: dict[str, Any] = found | {"gloves": tuple(found["gloves"])}
+def _row(document: dict[str, Any]) -> Row:
+    given: dict[str, Any] = document | {"gloves": tuple(document["gloves"])}
     row = Row(**given)
     if row.kind not in get_args(Kind) or not isinstance(row.number, int):
         raise ValueError(row.kind)
