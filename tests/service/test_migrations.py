@@ -42,10 +42,10 @@ def second_schema(tmp_path, monkeypatch):
         folder = tmp_path / "later"
         folder.mkdir(exist_ok=True)
         (folder / "9999_later.py").write_text(SECOND.format(last=last, newest=NEWEST))
-        config = original()
+        config = original(schema.migrations())
         own = f"{config.get_main_option('script_location')}/versions"
         config.set_main_option("version_locations", f"{own}:{folder}")
-        monkeypatch.setattr(migrate, "_config", lambda: config)
+        monkeypatch.setattr(migrate, "_config", lambda scripts: config)
         monkeypatch.setattr(schema, "newest_revision", lambda: "9999")
 
     return write
@@ -58,7 +58,7 @@ def test_migrations_build_exactly_the_tables_of_the_code(store):
 
 
 def test_the_newest_revision_is_that_of_alembic():
-    scripts = ScriptDirectory.from_config(migrate._config())
+    scripts = ScriptDirectory.from_config(migrate._config(schema.migrations()))
     assert schema.newest_revision() == scripts.get_current_head()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from contextlib import closing
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from alembic import command
@@ -15,7 +16,6 @@ from sqlalchemy import Connection, text
 from glovecal_service.store.blobs import full_disk_named
 from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import StoreError
-from glovecal_service.store.schema import migrations
 
 FIRST = "0007"
 """The schema that the first migration makes."""
@@ -27,9 +27,10 @@ class UnknownSchema(StoreError):
     """A newer Glovecal wrote the database, or one before the first release; nothing was changed."""
 
 
-def migrate(database: Database) -> None:
-    """Upgrade to the newest schema in one transaction. Raises UnknownSchema, StorageFull, StoreDamaged."""
-    config = _config()
+def migrate(database: Database, scripts: Traversable) -> None:
+    """Upgrade to the newest schema of ``scripts`` in one transaction. Raises UnknownSchema, StorageFull,
+    StoreDamaged."""
+    config = _config(scripts)
     known = ScriptDirectory.from_config(config)
     newest = known.get_current_head()
     with database.read() as connection:
@@ -59,9 +60,9 @@ def backup(source: Path, target: Path) -> None:
         original.backup(copy)
 
 
-def _config() -> Config:
+def _config(scripts: Traversable) -> Config:
     config = Config()
-    config.set_main_option("script_location", str(migrations()).replace("%", "%%"))
+    config.set_main_option("script_location", str(scripts).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
     return config
 

@@ -24,7 +24,7 @@ def upgrade(database: Database) -> None:
             return
     from glovecal_service.store.migrate import migrate
 
-    migrate(database)
+    migrate(database, migrations())
 
 
 def newest_revision() -> str:
