@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from glovecal_client.operating_system import move_over
 from glovecal_client.private_files import keep_private, open_private
 from glovecal_client.site.member import Kind, Member, read_member
 from glovecal_client.site.roles import Role
@@ -173,7 +173,7 @@ def _write(place: Path, member: Member, *, api_key: str | None = None) -> None:
     try:
         with open(unfinished, "w", encoding="utf-8", opener=open_private) as file:
             file.write(replace(member, api_key=api_key).document())
-        os.replace(unfinished, place)
+        move_over(unfinished, place)
     except OSError as error:
         raise Refusal(
             f"{place} cannot be written ({sentence_of(error)}); glovecal site renew {member.name} --to FILE "
