@@ -1,6 +1,8 @@
 # The Glovecal service: zenoh router, real-time prediction, REST, studio, cameras, training workers.
 #   docker build -f docker/service.Dockerfile -t glovecal-service .
 #   docker build -f docker/service.Dockerfile --build-arg EXTRAS="studio postgres" -t glovecal-service .   (without cameras)
+#   docker run -v glovecal:/data glovecal-service glovecal site init --host NAME, then glovecal key add NAME --role admin;
+#   docker run -v glovecal:/data -e GLOVECAL_SITE_FILE=/data/site/service.glovecal -p 8600:8600 -p 7447:7447 glovecal-service
 ARG BASE=python:3.11-slim-bookworm
 
 FROM $BASE AS build
@@ -29,7 +31,7 @@ COPY --from=build /opt/glovecal /opt/glovecal
 # HOME: what numba and matplotlib keep for the next start. Beside /data, /tmp is all that has to be writable.
 ENV PATH=/opt/glovecal/bin:$PATH HOME=/tmp \
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 GLOVECAL_INSTALLED_BY=image \
-    GLOVECAL_DATA=/data GLOVECAL_HOST=0.0.0.0 GLOVECAL_PORT=8600 GLOVECAL_ZENOH=tcp/0.0.0.0:7447
+    GLOVECAL_DATA=/data GLOVECAL_HOST=0.0.0.0 GLOVECAL_PORT=8600 GLOVECAL_ZENOH=tls/0.0.0.0:7447
 USER 10001
 VOLUME /data
 EXPOSE 8600 7447
