@@ -109,7 +109,8 @@ def read_member(file: Path) -> Member:
 
 
 def _not_usable(file: Path, problem: str) -> str:
-    return f"{file} is not a site's file: {problem}; make one with `glovecal site add` at the service"
+    make = "make one at the service with `glovecal site add NAME --as viewer`"
+    return f"{file} is not a site's file: {problem}; {make}"
 
 
 class _Wrong(Exception):

@@ -106,7 +106,10 @@ def revoke(name: Name) -> None:
     settings, folder = _place()
     folder.revoke(name)
     _revoke_key(settings, name)
-    out.print(f"Revoked {name}. To let that computer in again, make it a new file: glovecal site add {name}")
+    out.print(
+        f"Revoked {name}. To let that computer in again, make it a new file: "
+        f"glovecal site add {name} --as viewer"
+    )
 
 
 @app.command("renew")

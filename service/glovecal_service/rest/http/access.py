@@ -142,7 +142,7 @@ def _problem(record: KeyRecord | None, method: str, path: str) -> Problem | None
             401,
             "login-needed",
             "This service asks who you are: send a key, as in `Authorization: Bearer glk_...` (for commands "
-            "GLOVECAL_KEY), one that is not revoked. An admin makes one: glovecal key add NAME --role ROLE.",
+            "GLOVECAL_KEY) that is not revoked. An admin makes one: glovecal key add NAME --role viewer.",
             headers={"WWW-Authenticate": "Bearer"},
         )
     if not path.startswith(f"{PREFIX}/"):
@@ -155,7 +155,7 @@ def _problem(record: KeyRecord | None, method: str, path: str) -> Problem | None
         return Problem(
             403,
             "role-too-low",
-            f"Key {record.name} is of a {record.role}; this needs {needed}. An admin makes such a key: "
-            f"glovecal key add NAME --role {needed}.",
+            f"Key {record.name} is of a {record.role}; this needs {needed}. An admin makes such, as in: "
+            "glovecal key add NAME --role operator.",
         )
     return None
