@@ -44,7 +44,10 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
 
 def _session() -> dict[str, str]:
     """The cookie with which the page was opened: what it asks is asked by who opened it."""
-    request = context.client.request if context.slot_stack else None
+    try:
+        request = context.client.request if context.slot_stack else None
+    except RuntimeError:  # the part of the page in which this began is gone
+        request = None
     token = None if request is None else request.cookies.get(SESSION_COOKIE)
     return {} if token is None else {"Cookie": f"{SESSION_COOKIE}={token}"}
 

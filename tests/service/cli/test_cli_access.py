@@ -34,7 +34,9 @@ def test_a_key_is_made_listed_and_revoked_and_the_log_tells_it(run: Run, tmp_pat
 
 
 def test_a_service_that_others_reach_does_not_start_without_an_admin(tmp_path: Path) -> None:
-    settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_HOST": "0.0.0.0", "GLOVECAL_PORT": "0"}
+    settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_LOGIN": "always", "GLOVECAL_PORT": "0"}
     refused = glovecal(settings | {"GLOVECAL_ZENOH": "tcp/127.0.0.1:0"}, "serve")
     assert refused.code == 1
     assert "make one: glovecal key add NAME --role admin" in refused.said
+    beyond = glovecal(settings | {"GLOVECAL_HOST": "0.0.0.0"}, "serve")
+    assert "glovecal site init --host NAME" in beyond.said
