@@ -42,7 +42,7 @@ def trained(client: RestClient, hand: str) -> str:
 def served(settings: Settings, hand: str) -> tuple[str | None, str]:
     """What the glove of that hand is served with, and what is said of it."""
     with Store.open(settings) as store:
-        meta = {"hand": hand, "sensors": list(LAYOUT.sensors)}
+        meta = {"layout": LAYOUT.name, "subject": "anna", "hand": hand, "sensors": list(LAYOUT.sensors)}
         serving = choose(store, hand, meta, {})
     return serving.model and serving.model.model_id, serving.sentence
 
