@@ -113,6 +113,8 @@ def refusal(site: Site, monkeypatch: pytest.MonkeyPatch, member: Member, endpoin
 
 
 def test_why_a_login_fails_is_told(site: Site, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("glovecal_client.session.ADMITTED_WITHIN_S", 0.5)
+    monkeypatch.setattr("glovecal_client.site.login.GREETED_WITHIN_S", 1.0)
     assert "it was revoked" in refusal(site, monkeypatch, site.members["revoked"])
     stranger = dataclasses.replace(_other_site(tmp_path), kind="viewer")
     assert "belongs to another site" in refusal(site, monkeypatch, stranger)
@@ -203,6 +205,12 @@ def test_the_authority_s_key_may_be_moved_away(tmp_path: Path) -> None:
         folder.add("viewer", "viewer")
     member = folder.add("viewer", "viewer", key=away)
     assert (member.zenoh, member.rest) == (("tls/lab.example:7447",), "https://lab.example:8600")
+    with pytest.raises(BadInput, match="gloves are for a capture"):
+        folder.add("second", "viewer", gloves=["right"], key=away)
+    with pytest.raises(BadInput, match="is a member already"):
+        folder.add("viewer", "viewer", key=away)
+    with pytest.raises(BadInput, match="there is a site"):
+        folder.begin("lab", [], zenoh_port=1, rest_port=1)
     other = SiteFolder(tmp_path / "other")
     other.begin("lab", [], zenoh_port=1, rest_port=1)
     with pytest.raises(BadInput, match="not that of this site's authority"):
