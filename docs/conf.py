@@ -73,6 +73,7 @@ NAVIGATION = {
         "docs/applications",
         "docs/deploy",
         "docs/keys",
+        "docs/security",
     ],
     "Reference": [
         "Commands <docs/commands>",
