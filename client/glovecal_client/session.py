@@ -19,11 +19,10 @@ import zenoh
 
 from glovecal_client.errors import BadName, NoAnswer, NotAdmitted, QueryRefused
 from glovecal_client.hosts import is_unspecified
-from glovecal_client.keys import admission_key
 from glovecal_client.site.certificates import check_certificate
 from glovecal_client.site.login import why_refused
 from glovecal_client.site.member import Member, member_of_environment
-from glovecal_client.site.renewed_session import RenewedSession
+from glovecal_client.site.renewed_session import RenewedSession, is_admitted
 from glovecal_client.site.rules import Rules
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -206,10 +205,7 @@ def _require_admission(session: zenoh.Session, member: Member, endpoints: Sequen
     """
     until = time.monotonic() + ADMITTED_WITHIN_S
     while time.monotonic() < until:
-        if any(
-            reply.ok is not None
-            for reply in session.liveliness().get(admission_key(member.site), timeout=1.0)
-        ):
+        if is_admitted(session, member.site):
             return
         time.sleep(0.05)
     session.close()

@@ -21,10 +21,16 @@ _ATTEMPT_EVERY_S = 0.02
 class KeptSession:
     """Used as a ``zenoh.Session``. While it is being replaced, what is put is lost."""
 
-    def __init__(self, open_session: Callable[[], zenoh.Session], *, alone: bool) -> None:
-        """``alone``: the old session must be closed before a new one can open, as a router has its port."""
+    def __init__(
+        self,
+        open_session: Callable[[], zenoh.Session],
+        wait_for_router: Callable[[zenoh.Session], object] | None,
+    ) -> None:
+        """``wait_for_router`` returns when the router has answered a new session, and so knows what was
+        declared on it: until then the old one hears. None: a router itself, whose old session must be closed
+        before a new one can open, as it has the port."""
         self._open_session = open_session
-        self._alone = alone
+        self._wait_for_router = wait_for_router
         self._lock = threading.RLock()
         self._session = open_session()
         self._closed = False
@@ -32,18 +38,21 @@ class KeptSession:
 
     def reopen(self) -> None:
         """Replace the session. Raises zenoh.ZError when no new one can be opened; then the old one goes on,
-        or is gone if ``alone``."""
+        or is gone if it is a router's."""
         with self._lock:
             if self._closed:
                 return
             old = self._session
-            if self._alone:
+            if self._wait_for_router is None:
                 old.close()
             self._session = self._opened()
             for each in self._declared:
                 each.declare_on(self._session)
-        if not self._alone:
-            old.close()
+        if self._wait_for_router is not None:
+            try:
+                self._wait_for_router(self._session)
+            finally:
+                old.close()
 
     def _opened(self) -> zenoh.Session:
         until = time.monotonic() + REOPEN_WITHIN_S

@@ -26,8 +26,8 @@ ENDPOINT = re.compile(r"tls/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z"
 REST_ADDRESS = re.compile(r"https://(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 _PEM = re.compile(r"(-----BEGIN ([A-Z ]+)-----\n[A-Za-z0-9+/=\n]+-----END \2-----\n)+\Z")
 
-Kind = Literal["service", "capture", "viewer", "worker"]
-"""A service makes poses; a capture sends what gloves measure; a viewer uses poses; a worker trains."""
+Kind = Literal["service", "capture", "viewer"]
+"""A service makes poses; a capture sends what gloves measure; a viewer uses poses."""
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 

@@ -10,12 +10,19 @@ from pathlib import Path
 import zenoh
 
 from glovecal_client.errors import ClientError
+from glovecal_client.keys import admission_key
 from glovecal_client.site.certificates import check_certificate
 from glovecal_client.site.kept_session import KeptSession
 from glovecal_client.site.member import Member, read_member, site_file
 
 LOOK_EVERY_S = 1.0
 _log = logging.getLogger("glovecal.site")
+
+
+def is_admitted(session: zenoh.Session, site: str) -> bool:
+    """Whether the router answers what every member may ask; it has then read all that was said before."""
+    replies = session.liveliness().get(admission_key(site), timeout=1.0)
+    return any(reply.ok is not None for reply in replies)
 
 
 class RenewedSession:
@@ -28,7 +35,10 @@ class RenewedSession:
         self._member = member
         self._file = site_file()
         first = [session]
-        self.session = KeptSession(lambda: first.pop() if first else open_session(self._member), alone=False)
+        self.session = KeptSession(
+            lambda: first.pop() if first else open_session(self._member),
+            lambda session: is_admitted(session, member.site),
+        )
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="site file", daemon=True)
         self._thread.start()

@@ -30,8 +30,7 @@ TABLE: dict[str, dict[Kind, tuple[Action, ...]]] = {
     "picture": {},
 }
 """A capture may do so for its own gloves only; it listens to status, meta and alive to find out whether
-another has its glove. The service may do everything, and is the only one that publishes poses. A worker is
-reached over Dask and has nothing to do here."""
+another has its glove. The service may do everything, and is the only one that publishes poses."""
 assert tuple(TABLE) == PLANES
 
 _IN, _OUT = "ingress", "egress"

@@ -133,7 +133,8 @@ def create_app(
 ) -> FastAPI:
     """The application; its lifespan opens the store (unless given) and runs the job dispatcher.
 
-    ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told.
+    ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told, and nobody
+    but who has the data folder reaches it.
 
     On loopback whoever reaches the port may do everything, and ``RequestGuard`` keeps pages of other sites
     out; beyond it ``AccessGuard`` asks who it is.
@@ -178,7 +179,7 @@ def create_app(
     app.state.allowed_methods = AllowedMethods(_routers())
     install_error_handlers(app)
     install_openapi(app, layouts.LayoutBody)
-    _guard(app, settings, metrics, body_patience_s)
+    _guard(app, settings, metrics, body_patience_s, is_asked=asks_who(settings) and not of_one_command)
     return app
 
 
@@ -203,7 +204,9 @@ async def _sweep_hourly(store: Store, settings: Settings) -> None:
         await asyncio.sleep(SWEEP_EVERY_S)
 
 
-def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: float) -> None:
+def _guard(
+    app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: float, *, is_asked: bool
+) -> None:
     """The last added is the outermost: every refusal below is seen, counted and given an id."""
 
     def limit(path: str) -> int:
@@ -212,7 +215,7 @@ def _guard(app: FastAPI, settings: Settings, metrics: Metrics, body_patience_s: 
         return settings.upload_limit_bytes if _takes_files(path) else JSON_LIMIT_BYTES
 
     app.add_middleware(BodyGuard, limit=limit, patience_s=body_patience_s)
-    app.add_middleware(AccessGuard, is_asked=asks_who(settings))
+    app.add_middleware(AccessGuard, is_asked=is_asked)
     app.state.allowed_hosts = AllowedHosts(settings)
     app.add_middleware(RequestGuard, hosts=app.state.allowed_hosts)
     app.add_middleware(Observation, metrics=metrics)

@@ -9,16 +9,20 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import httpx
 from fastapi import FastAPI
 from nicegui import context, ui
+from nicegui.slot import Slot
 
 from glovecal_service.plain import TOTAL, read
 from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 
 PATIENCE_S = 300.0
 Found = TypeVar("Found")
+_TOKENS: WeakKeyDictionary[Slot, str | None] = WeakKeyDictionary()
+"""Of the parts of pages that asked for something: a part may clear itself and go on asking."""
 
 
 class Refusal(Exception):
@@ -44,11 +48,15 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
 
 def _session() -> dict[str, str]:
     """The cookie with which the page was opened: what it asks is asked by who opened it."""
+    if not context.slot_stack:
+        return {}
+    part = context.slot
     try:
-        request = context.client.request if context.slot_stack else None
-    except RuntimeError:  # the part of the page in which this began is gone
-        request = None
-    token = None if request is None else request.cookies.get(SESSION_COOKIE)
+        request = context.client.request
+        _TOKENS[part] = None if request is None else request.cookies.get(SESSION_COOKIE)
+    except RuntimeError:
+        pass  # the part of the page in which this began was cleared since it asked first
+    token = _TOKENS.get(part)
     return {} if token is None else {"Cookie": f"{SESSION_COOKIE}={token}"}
 
 

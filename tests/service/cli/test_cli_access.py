@@ -33,6 +33,15 @@ def test_a_key_is_made_listed_and_revoked_and_the_log_tells_it(run: Run, tmp_pat
     assert key not in "".join(lines)
 
 
+def test_the_first_admin_key_is_made_where_the_settings_reach_beyond_loopback(tmp_path: Path) -> None:
+    """As in a container, whose image sets the address."""
+    settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_HOST": "0.0.0.0"}
+    made = glovecal(settings, "key", "add", "lena", "--role", "admin")
+    assert made.code == 0, made.err
+    assert made.out.startswith("glk_")
+    assert glovecal(settings, "subject", "add", "anna").code == 0
+
+
 def test_a_service_that_others_reach_does_not_start_without_an_admin(tmp_path: Path) -> None:
     settings = {"GLOVECAL_DATA": str(tmp_path / "data"), "GLOVECAL_LOGIN": "always", "GLOVECAL_PORT": "0"}
     refused = glovecal(settings | {"GLOVECAL_ZENOH": "tcp/127.0.0.1:0"}, "serve")

@@ -1,8 +1,8 @@
-"""The OWASP API Security Top 10 (2023), as far as they apply to a service without logins on loopback.
+"""The OWASP API Security Top 10 (2023), as far as they apply to a service on loopback.
 
-API1, 2, 3 and 5 are about users and rights, of which there are none yet: whoever reaches the port may do
-everything. So the port must be hard to reach for anyone else (API7, API8), nothing may run away with the
-machine (API4), and everything served is documented (API9).
+There whoever reaches the port may do everything, so it must be hard to reach for anyone else (API7, API8),
+nothing may run away with the machine (API4), and everything served is documented (API9). What is about users
+and rights (API1, 2, 3 and 5) is held in ``test_rest_access.py``, for a service that asks for keys.
 """
 
 from __future__ import annotations

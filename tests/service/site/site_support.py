@@ -44,7 +44,6 @@ class Site:
             "bound": self.folder.add("bound", "capture", gloves=BOUND),
             "other": self.folder.add("other", "capture", gloves=("left",)),
             "viewer": self.folder.add("viewer", "viewer"),
-            "worker": self.folder.add("worker", "worker"),
             "revoked": self.folder.add("revoked", "viewer"),
         }
         self.folder.revoke("revoked")

@@ -6,56 +6,25 @@ import csv
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
-from dropping import drop
-from foreign_tables import JOINTS, recording
+from dropping import FINGERS, LATE_S, drop, motion_file, readings_table, takes_without_angles
+from foreign_tables import JOINTS
 from playwright.sync_api import expect
 from studio_support import Open, serious
 
 from glovecal_client.rest import RestClient
-from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
-from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_models.layout import Layout
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3
-from glovecal_service.exports.formats import FORMATS as EXPORTS
-from glovecal_service.exports.hand_motion import HandMotion
 from glovecal_service.exports.vendor_calibrations.calibration_format import Counts, SensorLine
 from glovecal_service.exports.vendor_calibrations.formats import FORMATS
 
 pytestmark = pytest.mark.needs_chromium
-FINGERS = ("T_IP", "I_PIP", "M_PIP", "R_PIP", "P_PIP")
-LATE_S = 7.3
-"""Of another system that was started after the glove."""
 
 
 @pytest.fixture(scope="module")
 def client(address: str) -> Iterator[RestClient]:
     with RestClient(address) as client:
         yield client
-
-
-def readings_table(path: Path, take: int, seconds: float) -> np.ndarray:
-    """Readings of an unknown glove without angles; the angles (N, 5) of its fingers."""
-    time_s, readings, angles = recording(take, 1, seconds=seconds)
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        rows = csv.writer(stream)
-        rows.writerow(["time [s]", *(f"{name} sensor" for name in JOINTS)])
-        rows.writerows([f"{at:.4f}", *map(int, counts)] for at, counts in zip(time_s, readings, strict=True))
-    return angles
-
-
-def motion_file(path: Path, angles: np.ndarray, *, from_s: float = 0.0) -> Path:
-    """What a camera system saw of that hand, from ``from_s`` on, on a clock of its own."""
-    at = np.arange(len(angles)) / 60.0
-    seen = at >= from_s
-    degrees = completed(FINGERS, angles[seen], HAND_ROTATIONS)
-    motion = HandMotion(
-        "R", at[seen] - from_s, ("none",), np.zeros((int(seen.sum()), 1)), HAND_ROTATIONS, degrees,
-        np.ones_like(degrees), hand_skeleton(),
-    )  # fmt: skip
-    EXPORTS[path.suffix].write([motion], "joints", path)
-    return path
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -90,21 +59,7 @@ def test_a_motion_file_becomes_the_reference_of_its_take(
     opened: Open, client: RestClient, tmp_path: Path, suffix: str
 ) -> None:
     person = f"mona-{suffix[1:]}"
-    readings = [tmp_path / f"{person}-{number}.csv" for number in range(2)]
-    first = 10 if suffix == ".trc" else 20
-    angles = [readings_table(path, first + number, 25.0) for number, path in enumerate(readings)]
-    layout = {
-        "name": "five-fingers",
-        "sensors": list(FINGERS),
-        "rotations": {name: [name] for name in FINGERS},
-    }
-    client.put("/gloves/five-fingers", layout)
-    for path in readings:
-        named = path.read_text().replace("time [s]", "time_s", 1)
-        for joint, rotation in zip(JOINTS, FINGERS, strict=True):
-            named = named.replace(f"{joint} sensor", f"s.{rotation}", 1)
-        path.write_text(named)
-        client.upload_takes(path, subject=person, layout="five-fingers", create_subject=True)
+    angles = takes_without_angles(client, person, tmp_path, first=10 if suffix == ".trc" else 20)
     seen = opened(f"takes?who={person}")
     drop(seen.page, [motion_file(tmp_path / f"optical{suffix}", angles[1], from_s=LATE_S)])
     told = seen.page.get_by_role("status").filter(has_text="It belongs to take")

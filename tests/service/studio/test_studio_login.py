@@ -8,10 +8,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from dropping import LATE_S, drop, motion_file, takes_without_angles
 from playwright.sync_api import Browser, expect
 from realtime_support import free_endpoint, part_of_service, store_model
 from studio_support import PATIENCE_MS, Open, serious
 
+from glovecal_client.rest import RestClient
 from glovecal_service.serve import web
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -29,6 +31,7 @@ def asking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, dict
         for subject in ("anna", "ben"):
             store_model(store, subject, degrees_per_count=0.5)
         keys = {"of anna": store.keys.create("of-anna", "trainer", ["anna"])[1]}
+        keys["training"] = store.keys.create("training", "trainer")[1]
         keys["looking"] = store.keys.create("looking", "viewer")[1]
     with ExitStack() as running:
         running.enter_context(part_of_service(web, settings))
@@ -58,6 +61,24 @@ def test_a_key_is_typed_once_and_pages_show_what_is_its(
     page.get_by_role("button", name="Log out").click()
     expect(page).to_have_url(f"{address}/login?page=/studio")
     assert complaints == []
+    context.close()
+
+
+def test_a_part_of_a_page_that_clears_itself_asks_on_as_who_opened_it(
+    browser: Browser, asking: tuple[str, dict[str, str]], tmp_path: Path
+) -> None:
+    address, keys = asking
+    with RestClient(address, key=keys["training"]) as client:
+        angles = takes_without_angles(client, "mona", tmp_path, first=30)
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{address}/login?page=/studio/takes%3Fwho=mona")
+    page.get_by_label("Your key").fill(keys["training"])
+    page.get_by_role("button", name="Log in").click()
+    drop(page, [motion_file(tmp_path / "optical.trc", angles[1], from_s=LATE_S)])
+    page.get_by_role("button", name="Attach to the take").click()
+    expect(page.get_by_role("heading", name="Train a model of mona")).to_be_visible()
     context.close()
 
 

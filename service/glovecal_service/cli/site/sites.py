@@ -51,7 +51,7 @@ def init(host: Hosts = None) -> None:
     out.print(
         f"Site {register.site} is in {folder.folder}. The service answers to {', '.join(register.hosts)}.\n"
         f"Start it: GLOVECAL_SITE_FILE={folder.service_file}{elsewhere} glovecal serve\n"
-        "Add others: glovecal site add NAME --as capture (or viewer, worker)\n"
+        "Add others: glovecal site add NAME --as capture (or viewer)\n"
         f"Whoever has {folder.authority_key} can make members. To keep it elsewhere, move it away, and "
         "give its place to add and renew with --authority-key."
     )
@@ -60,7 +60,7 @@ def init(host: Hosts = None) -> None:
 @app.command("add")
 def add(
     name: Name,
-    kind: Annotated[Kind, typer.Option("--as", help="What it does: capture, viewer, worker or service.")],
+    kind: Annotated[Kind, typer.Option("--as", help="What it does: capture, viewer or service.")],
     glove: Annotated[
         list[str] | None,
         typer.Option("--glove", help="Of a capture: the only gloves it may publish; repeatable."),

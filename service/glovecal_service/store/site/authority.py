@@ -124,9 +124,9 @@ def general_name(host: str) -> x509.GeneralName:
 
 
 def _purposes(kind: Kind) -> list[x509.ObjectIdentifier]:
-    """Only the service answers to others; Dask's workers are reached by its scheduler too."""
+    """Only the service answers to others."""
     both = [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH]
-    return both if kind in ("service", "worker") else both[:1]
+    return both if kind == "service" else both[:1]
 
 
 def _builder(

@@ -39,7 +39,7 @@ class SiteRouter:
         self._folder = SiteFolder(settings.data)
         self._member = read_member(file)
         self._rules = Rules(settings.site, self._members())
-        self.session = KeptSession(self._open, alone=True)
+        self.session = KeptSession(self._open, None)
         self.session.liveliness().declare_token(admission_key(settings.site))
 
     def _open(self) -> zenoh.Session:
