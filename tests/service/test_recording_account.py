@@ -95,6 +95,9 @@ class Capture:
             raise NoAnswer("nobody answered")
 
 
+FORGED_NUMBERS = (1, 2, 400, 5000, 0, -1)
+"""Of frames of a stranger, against the last number given: the next ones, far ahead, and those that were."""
+
 STEPS = st.lists(
     st.one_of(
         st.tuples(st.just("received"), st.integers(1, 5)),
@@ -104,7 +107,7 @@ STEPS = st.lists(
         st.tuples(st.just("killed"), st.integers(0, 5)),
         st.tuples(st.just("restarted"), st.integers(0, 2)),
         st.tuples(st.just("unreachable"), st.just(0)),
-        st.tuples(st.just("forged"), st.integers(1, 4)),
+        st.tuples(st.just("forged"), st.integers(0, 3 * len(FORGED_NUMBERS) - 1)),
     ),
     min_size=1,
     max_size=12,
@@ -123,6 +126,8 @@ class Story:
         begin = {"run_id": f"{1:016x}", "sequence": self.capture.sequence, "wall_ns": wall_ns}
         self.file = self.opened(RunLedger.create(self.path, {BEGIN: begin}))
         self.begin = len(self.capture.numbered)
+        self.findings: dict[str, dict] = {}
+        """What a recording's row has of it."""
 
     def tell(self, what: str, count: int) -> None:
         if what == "killed":
@@ -144,21 +149,19 @@ class Story:
             if what.startswith("received"):
                 self.file.add(frame, encode_frame(frame))
 
-    def forge(self, count: int) -> None:
-        """Frames of a stranger: the next ones, numbers or clocks far ahead, and the last one again."""
+    def forge(self, kind: int) -> None:
+        """A frame of a stranger: any of the numbers, by a clock that is right, or ahead, or far ahead."""
         last = self.capture.numbered[-1].frame
-        for number in range(count):
-            ahead = (1, 2, 400, 0)[number % 4]
-            frame = replace(
-                last,
-                sequence=self.capture.sequence + ahead if ahead else last.sequence,
-                run_id=self.capture.runs[-1].run_id,
-                monotonic_ns=last.monotonic_ns + (number % 3) * 40_000 * MS + 1,
-                wall_ns=last.wall_ns + (number % 2) * 90_000 * MS,
-                readings=STRANGE,
-            )
-            if frame.sequence >= 0:
-                self.file.add(frame, encode_frame(frame))
+        clock, ahead = divmod(kind, len(FORGED_NUMBERS))
+        frame = replace(
+            last,
+            sequence=max(0, self.capture.sequence + FORGED_NUMBERS[ahead]),
+            run_id=self.capture.runs[-1].run_id,
+            monotonic_ns=last.monotonic_ns + clock * 40_000 * MS + 1,
+            wall_ns=last.wall_ns + (kind % 2) * 90_000 * MS,
+            readings=STRANGE,
+        )
+        self.file.add(frame, encode_frame(frame))
 
     def kill(self, frames_meanwhile: int) -> RunLedger:
         """The process is gone with what it knew; the file is left as it was."""
@@ -171,10 +174,12 @@ class Story:
         return self.capture.open.enter_context(closing(file))
 
     def settle(self, stop_ns: int) -> Settlement:
-        file = RunLedger.resume(self.path)
+        file = RunLedger.resume(self.path, self.findings)
         outcome = reconcile_and_compare(file, self.capture, stop_ns, Patience(60.0, Event()))
         file.close()
-        return Settlement.of(file, outcome)
+        settlement = Settlement.of(file, outcome)
+        self.findings = settlement.account[FINDINGS]
+        return settlement
 
     def keys(self, runs: list[dict], what: str) -> set[tuple[int, int]]:
         ranges = [(int(run["run_id"], 16), *gap) for run in runs for gap in run[what]]
@@ -222,6 +227,7 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
     after=[("received", 1)],
 )
 @example(before=[("forged", 2), ("received, not logged", 2), ("lost", 1)], after=[("unreachable", 0)])
+@example(before=[("received", 1)], after=[("forged", 16)])
 @example(before=[("restarted", 2), ("restarted", 0), ("received", 1)], after=[("received", 1)])
 @given(before=STEPS, after=STEPS)
 def test_every_frame_up_to_the_stop_is_recorded_or_missing(

@@ -69,7 +69,7 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
     Raises NoAnswer, WireError, OutOfTime; QueryRefused where a run has no log, when all others were compared.
     """
     refused: QueryRefused | None = None
-    out: dict[int, list[int]] = {}
+    out: dict[int, set[int]] = {}
     not_logged = 0
     for run_id, frames in file.recorded().items():
         try:
@@ -77,25 +77,37 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
         except QueryRefused as error:
             refused = error
             continue
-        never_given = [sequence for sequence in unknown if sequence > file.reached.get(run_id, sequence)]
-        strange += never_given
-        not_logged += len(unknown) - len(never_given)
+        strange |= _never_given(file, run_id, unknown)
+        not_logged += len(unknown - strange)
         if strange:
             out[run_id] = strange
     for run_id, strange in out.items():
-        file.take_out(run_id, strange)
+        file.take_out(run_id, sorted(strange))
     taken_out = sum(map(len, out.values()))
     if refused is not None and not taken_out:
         raise refused
     return Comparison(taken_out, not_logged)
 
 
+def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
+    """Of the numbers that the log does not have, those that capture did not give: they are higher than its
+    last one, or were jumped to by more than a glove can send, and the log knows none of those after the jump.
+    """
+    reached = file.reached.get(run_id)
+    beyond = {sequence for sequence in unknown if reached is not None and sequence > reached}
+    for stretch in file.runs[run_id].stretches[1:]:
+        jumped_to = {number for first, last in stretch.recorded for number in range(first, last + 1)}
+        if jumped_to <= unknown:
+            beyond |= jumped_to
+    return beyond
+
+
 def _compared(
     run_id: int, frames: RecordedFrames, log: Log, time_left: Patience
-) -> tuple[list[int], list[int]]:
+) -> tuple[set[int], set[int]]:
     """Numbers of frames that differ from the log's, and of those that the log does not have."""
-    strange: list[int] = []
-    unknown: list[int] = []
+    strange: set[int] = set()
+    unknown: set[int] = set()
     at, last = 0, int(frames.sequences[-1])
     while at < len(frames):
         if time_left.is_over:
@@ -103,7 +115,7 @@ def _compared(
         first = int(frames.sequences[at])
         digest = _digest(log, run_id, first, last)
         if digest is None:
-            unknown += frames.sequences[at:].tolist()
+            unknown.update(frames.sequences[at:].tolist())
             break
         until = at + int(np.searchsorted(frames.sequences[at:], digest.last, side="right"))
         if until == at:
@@ -114,9 +126,9 @@ def _compared(
             logged = _logged(log, run_id, first, digest.last, time_left)
             for sequence, message in zip(frames.sequences[rows].tolist(), messages, strict=True):
                 if sequence not in logged:
-                    unknown.append(sequence)
+                    unknown.add(sequence)
                 elif logged[sequence] != message:
-                    strange.append(sequence)
+                    strange.add(sequence)
         at = until
         time_left.wait(PAUSE_S)
     return strange, unknown

@@ -158,8 +158,12 @@ class RunBooks:
         """
         self.run_id = run_id
         self.began_wall_ns = began_wall_ns
-        self.stretches = [Stretch(first, first - 1)]
-        """In the order in which they were sent."""
+        self.first = first
+        """Where the recording begins."""
+        self.newest = Stretch(first, first - 1)
+        """With the frame that came last."""
+        self.stretches = [self.newest]
+        """By their numbers, which none shares with another."""
         self.repaired = 0
         """Of the recorded frames, those fetched from the capture log."""
         self.last_wall_ns = 0
@@ -173,19 +177,15 @@ class RunBooks:
         self._since_wall_ns = since_wall_ns
 
     @property
-    def first(self) -> int:
-        return self.stretches[0].first
-
-    @property
     def last(self) -> int:
         """The last number that belongs to the recording, as far as is known; ``first - 1``: none."""
-        return self.stretches[-1].last
+        return self.newest.last
 
     def note_given(self, sequence: int) -> None:
         """Capture said that it gave this number."""
         self.given = max(self.given, sequence)
-        newest = self.stretches[-1]
-        newest.last = max(newest.last, sequence)
+        later = [part.first - 1 for part in self.stretches if part.first > self.newest.last]
+        self.newest.last = max(self.newest.last, min([sequence, *later]))
 
     def missing(self) -> list[tuple[int, int]]:
         return [gap for part in self.stretches for gap in part.recorded.missing(part.first, part.last)]
@@ -193,9 +193,9 @@ class RunBooks:
     def doubtful(self) -> list[tuple[int, int]]:
         """Numbers that were jumped over, and for which the capture log was not asked yet."""
         return [
-            (before.last + 1, after.first - 1)
+            (max(before.last + 1, self.first), after.first - 1)
             for before, after in pairwise(self.stretches)
-            if not after.asked and before.last + 1 < after.first
+            if not after.asked and max(before.last + 1, self.first) < after.first
         ]
 
     def note_asked(self, first: int, last: int) -> None:
@@ -219,50 +219,43 @@ class RunBooks:
         return any(sequence in part.recorded for part in self.stretches)
 
     def enter(self, frame: Frame) -> bool:
-        """Note a frame as recorded; False if it was, or does not belong to the recording."""
-        part = next((part for part in self.stretches if part.lacks(frame.sequence)), None)
-        if part is not None:
-            part.enter(frame)
-        elif not (self._enter_fetched(frame) if frame.repaired else self._enter_newest(frame)):
+        """Note a frame as recorded; False if one of its number is, or it does not belong to the recording."""
+        if self.has(frame.sequence):
             return False
+        at = bisect_right(self.stretches, frame.sequence, key=lambda part: part.first) - 1
+        before = self.stretches[at] if at >= 0 else None
+        if before is not None and before.lacks(frame.sequence):
+            before.enter(frame)
+        elif (before is None and frame.repaired) or self._is_late(frame):
+            return False
+        else:
+            self._enter_between(at, frame)
         self.repaired += frame.repaired
         if frame.sequence >= self.last:
             self.last_wall_ns = frame.wall_ns
         return True
 
-    def _enter_newest(self, frame: Frame) -> bool:
-        """A frame as it came: it follows, or begins a stretch."""
-        newest = self.stretches[-1]
-        if frame.sequence <= newest.last:
-            if newest.recorded:
-                is_late = frame.monotonic_ns <= newest.last_ns
-            else:  # on its way when capture said where it stood
-                is_late = newest.first - frame.sequence <= BURST_FRAMES
-            if is_late:
-                return False
-        if self._reach(newest, frame):
-            newest.enter(frame)
+    def _is_late(self, frame: Frame) -> bool:
+        if frame.repaired or frame.sequence > self.last:
+            return False
+        if self.newest.recorded:
+            return frame.monotonic_ns <= self.newest.last_ns
+        # on its way when capture said where it stood
+        return self.first - frame.sequence <= BURST_FRAMES
+
+    def _enter_between(self, at: int, frame: Frame) -> None:
+        """After stretch ``at``, as a part of it or as one of its own; before all of them where ``at`` is -1."""
+        before = self.stretches[at] if at >= 0 else None
+        part = before if before and self._reach(before, frame) else Stretch.of(frame)
+        if not frame.repaired or before is self.newest:
+            self.newest = part
+        if part is before:
+            part.enter(frame)
         else:
-            self.stretches.append(Stretch.of(frame))
-        return True
-
-    def _enter_fetched(self, frame: Frame) -> bool:
-        """A frame of the capture log, from after the end of a stretch."""
-        for at, (part, begins) in enumerate(self._stretches_and_next_first()):
-            if part.last < frame.sequence < begins:
-                if self._reach(part, frame):
-                    part.enter(frame)
-                else:
-                    at += 1
-                    part = Stretch.of(frame)
-                    self.stretches.insert(at, part)
-                self._join_next(at)
-                return True
-        return False
-
-    def _stretches_and_next_first(self) -> Iterator[tuple[Stretch, float]]:
-        firsts = [*(part.first for part in self.stretches[1:]), float("inf")]
-        return zip(list(self.stretches), firsts, strict=True)
+            if at < 0:
+                self.stretches = [each for each in self.stretches if each.first <= each.last]
+            self.stretches.insert(at + 1, part)
+        self._join_next(self.stretches.index(part))
 
     def _reach(self, part: Stretch, frame: Frame) -> bool:
         if part.recorded:
@@ -274,9 +267,10 @@ class RunBooks:
         """Two stretches are one where what lies between can have been sent."""
         if at + 1 < len(self.stretches):
             part, later = self.stretches[at], self.stretches[at + 1]
-            if part.reaches(later.first, later.first_ns):
+            if part.last_ns <= later.first_ns and part.reaches(later.first, later.first_ns):
                 part.join(later)
                 del self.stretches[at + 1]
+                self.newest = part if self.newest is later else self.newest
 
     def take_over(self, before: RunBooks) -> None:
         """What capture said while these books were kept ``before``."""
