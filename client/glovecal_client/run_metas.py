@@ -29,11 +29,11 @@ class RunMetas:
     """Of one glove. For one thread; ``refused`` and ``sentence`` may be read by others."""
 
     def __init__(self) -> None:
-        self.refused = 0
+        self.refused: int = 0
         """Documents that contradicted an earlier one of their run."""
-        self.sentence = ""
+        self.sentence: str = ""
         """About the last of them; "" before the first."""
-        self.contradicted = ""
+        self.contradicted: str = ""
         """The run of the last of them."""
         self._runs: dict[str, dict[str, Any]] = {}
 

@@ -61,6 +61,7 @@ def test_a_flood_in_a_gloves_name_does_not_cost_it_a_frame() -> None:
 def test_a_glove_that_repeats_itself_ten_times_over_is_bounded_too() -> None:
     lane = GlovePipeline(GloveKeys("lab", "g1"))
     frames = moving_frames(300)
+    added: list[bool] = []
     for number, frame in enumerate(frames):
         at_ns = 10**15 + number * 10_000_000
         added = [lane.add(encode_frame(frame), at_ns) for _ in range(100)]

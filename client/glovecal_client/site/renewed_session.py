@@ -35,7 +35,7 @@ class RenewedSession:
         self._member = member
         self._file = site_file()
         first = [session]
-        self.session = KeptSession(
+        self.session: KeptSession = KeptSession(
             lambda: first.pop() if first else open_session(self._member),
             lambda session: is_admitted(session, member.site),
         )

@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 
@@ -150,7 +150,7 @@ def _write_curve(records: Records, id: np.int64, times: Compressed, curve: np.nd
 
 
 def euler_curves(
-    turns: Iterable[tuple[slice, np.ndarray]], count: int, orders: Sequence[str], scratch: BinaryIO
+    turns: Iterable[tuple[slice, np.ndarray]], count: int, orders: Sequence[str], scratch: IO[bytes]
 ) -> np.ndarray:
     """(B, 3, N) degrees of turns (n, B, 3, 3) that come block by block, in a file: by frame as they come, by
     curve as they are written. ``orders``: of each bone, as scipy names them, angles by X, Y and Z."""

@@ -244,7 +244,7 @@ class RunBooks:
         return self.first - frame.sequence <= BURST_FRAMES
 
     def _enter_between(self, at: int, frame: Frame) -> None:
-        """After stretch ``at``, as a part of it or as one of its own; before all of them where ``at`` is -1."""
+        """After stretch ``at``, as a part of it or as one of its own; before all of them if ``at`` is -1."""
         before = self.stretches[at] if at >= 0 else None
         part = before if before and self._reach(before, frame) else Stretch.of(frame)
         if not frame.repaired or before is self.newest:
