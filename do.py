@@ -5,7 +5,9 @@
     python3 do.py serve     run the service (real time, REST) on this machine
     python3 do.py glovecal  the command line: python3 do.py glovecal take list
     python3 do.py test      the test suite; with -m slow what it leaves out because it takes minutes
-    python3 do.py check     format, lint, types; those also as on Windows and macOS
+    python3 do.py check     format, lint, types (those also as on Windows and macOS), and known
+                            vulnerabilities of the locked packages, where osv.dev is reached
+    python3 do.py sbom      what is installed with Glovecal, with hashes, as CycloneDX: dist/sbom.cdx.json
     python3 do.py bench     speed against other libraries, as ratios, with a picture
     python3 do.py paper     Wang & Neff 2013 reproduced: every table and figure, as one page (5 minutes);
                             --part colour-glove: Wang & Popovic 2009's, as far as built (20 minutes)
@@ -34,6 +36,7 @@ Any verb with --smoke tries itself in seconds, with what is installed: nothing i
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -189,10 +192,34 @@ def check(arguments: list[str]) -> int:
         ["pyright", "--threads", "2", "--pythonplatform", name, *near_the_system()] for name in OTHER_SYSTEMS
     ]
     public = [["pyright", "--ignoreexternal", "--verifytypes", name] for name in PUBLIC]
-    return max(
-        run(*step, dev=True)
-        for step in (*ruff, encoding, ["pyright", "--threads", "2", *arguments], *elsewhere, *public)
-    )
+    steps = (*ruff, encoding, ["pyright", "--threads", "2", *arguments], *elsewhere, *public)
+    return max(*[run(*step, dev=True) for step in steps], known_vulnerabilities())
+
+
+def known_vulnerabilities() -> int:
+    """Of the locked packages that Glovecal is installed with, by osv.dev; 0 where it is not reached."""
+    audit = [*uv(), "audit", "--frozen", "--no-dev", "--preview-features", "audit-command"]
+    found = subprocess.run(audit, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    if found.returncode not in (0, 1):
+        print("Known vulnerabilities were not looked up: osv.dev is not reached.", file=sys.stderr)
+        return 0
+    print(found.stdout)
+    return found.returncode
+
+
+def sbom(arguments: list[str]) -> int:
+    """uv calls this form experimental. Container images have one of their own: docker/."""
+    with tempfile.TemporaryDirectory() as temporary:
+        file = Path(temporary if SMOKE in arguments else ROOT / "dist", "sbom.cdx.json")
+        file.parent.mkdir(exist_ok=True)
+        form = ("--format", "cyclonedx1.5", "--preview-features", "sbom-export", "--output-file", str(file))
+        code = exit_code_of(
+            [*uv(), "--quiet", "export", "--frozen", "--all-packages", "--all-extras", "--no-dev", *form]
+        )
+        if code == 0:
+            count = len(json.loads(file.read_text(encoding="utf-8"))["components"])
+            print(f"{count} packages: {file}")
+    return code
 
 
 def near_the_system() -> list[str]:
@@ -296,6 +323,7 @@ VERBS = {
     "glovecal": glovecal,
     "test": test,
     "check": check,
+    "sbom": sbom,
     "bench": bench,
     "paper": paper,
     "study": study,

@@ -17,6 +17,9 @@ RUN uv sync --frozen --no-default-groups --no-install-workspace --no-build \
         --package glovecal-client --extra capture && \
     uv sync --frozen --no-default-groups --no-editable --compile-bytecode \
         --package glovecal-client --extra capture
+# What is in the image, as CycloneDX.
+RUN uv export --quiet --frozen --no-default-groups --package glovecal-client --extra capture \
+        --format cyclonedx1.5 --preview-features sbom-export --output-file /opt/glovecal/sbom.cdx.json
 
 FROM $BASE
 RUN useradd --no-create-home --uid 10001 --groups dialout glovecal && install -d -o glovecal -m 700 /data

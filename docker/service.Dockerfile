@@ -24,6 +24,9 @@ COPY client client
 COPY service service
 RUN uv sync --frozen --no-default-groups --no-editable --compile-bytecode \
     --package glovecal-service $(printf -- '--extra %s ' $EXTRAS)
+# What is in the image, as CycloneDX.
+RUN uv export --quiet --frozen --no-default-groups --package glovecal-service $(printf -- '--extra %s ' $EXTRAS) \
+        --format cyclonedx1.5 --preview-features sbom-export --output-file /opt/glovecal/sbom.cdx.json
 
 FROM $BASE
 RUN useradd --no-create-home --uid 10001 glovecal && install -d -o glovecal -m 700 /data

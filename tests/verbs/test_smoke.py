@@ -44,6 +44,7 @@ VERBS = (
     "study active",
     "fresh",
     "containers",
+    "sbom",
 )
 
 
@@ -157,6 +158,10 @@ def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> N
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         not_here("needs git and a checkout that can be cloned")
     assert smoke["fresh"].result().number(r"\| ended with code (\d+), \d+ s \|") == 0
+
+
+def test_sbom_lists_what_is_installed(smoke) -> None:
+    assert smoke["sbom"].result().number(r"(\d+) packages: .*sbom\.cdx\.json") > 50
 
 
 def test_container_files_are_looked_at(smoke) -> None:
