@@ -2,11 +2,13 @@
 
 import threading
 from collections import Counter
+from datetime import timedelta
 
 import pytest
 
 from glovecal_models.errors import BadInput
 from glovecal_service.store import Store
+from glovecal_service.store.database import now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.jobs import LEASE_S
 
@@ -118,6 +120,17 @@ def test_a_cancelled_job_whose_runner_died_is_cancelled(timed, clock):
     assert timed.jobs.claim("next") is None
     assert timed.jobs.get(job.id).state == "cancelled"
     assert timed.jobs.request_cancel(job.id).state == "cancelled"
+
+
+def test_steps_of_jobs_that_are_over_are_forgotten_and_the_jobs_stay(store):
+    over, waiting = store.jobs.create("train", {}), store.jobs.create("train", {})
+    store.jobs.request_cancel(over.id)
+    assert store.jobs.forget_steps(now() - timedelta(days=1)) == 0
+    steps = len(store.jobs.events(over.id))
+    assert store.jobs.forget_steps(now() + timedelta(seconds=1)) == steps > 0
+    assert store.jobs.events(over.id) == []
+    assert store.jobs.get(over.id).state == "cancelled"
+    assert store.jobs.events(waiting.id) != []
 
 
 def test_only_the_dead_owners_jobs_are_queued_again(store):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -78,6 +79,7 @@ from glovecal_service.store.retention import sweep
 from glovecal_service.store.site.web_login import AllowedHosts
 from glovecal_service.store.store import Store
 
+_log = logging.getLogger("glovecal.rest")
 JSON_LIMIT_BYTES = 8_000_000
 """Enough for 20,000 frames of 18 sensors to predict."""
 STUDIO_UPLOAD = re.compile(r"/studio/_nicegui/client/[^/]+/upload/\d+")
@@ -200,7 +202,8 @@ async def _sweep_hourly(store: Store, settings: Settings) -> None:
     """Not at once: most commands are over sooner."""
     await asyncio.sleep(FIRST_SWEEP_AFTER_S)
     while True:
-        await run_in_threadpool(sweep, store, settings)
+        if swept := await run_in_threadpool(sweep, store, settings):
+            _log.info("removed after %g days: %s", settings.keep_days, swept)
         await asyncio.sleep(SWEEP_EVERY_S)
 
 

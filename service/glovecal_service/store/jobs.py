@@ -14,7 +14,7 @@ from datetime import datetime
 from functools import partial
 from typing import Any
 
-from sqlalchemy import Connection, Select, func, insert, select
+from sqlalchemy import Connection, Select, delete, func, insert, select
 
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
@@ -186,6 +186,13 @@ class Jobs:
         with self._database.read() as connection:
             _require(connection, id)
             return sound_rows(connection, table, statement, lambda values: JobEvent(**values))
+
+    def forget_steps(self, before: datetime) -> int:
+        """Remove what happened in jobs that were over before that time, but not the jobs; how many steps."""
+        jobs, steps = tables.jobs.c, tables.job_events
+        over = select(jobs.id).where(jobs.state.in_(FINISHED_JOB_STATES) & (jobs.finished_at < before))
+        with self._database.write() as connection:
+            return connection.execute(delete(steps).where(steps.c.job.in_(over))).rowcount
 
     def list(
         self, *, subject: str | None = None, only_unfinished: bool = False, part: ListPart = WHOLE

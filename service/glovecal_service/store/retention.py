@@ -2,8 +2,8 @@
 
 Kept whatever their age: database, artifacts, and each upload that a stored take came from. Swept
 ``GLOVECAL_KEEP_DAYS`` after they were last written: uploads that no take came from, films (a take's video is
-a copy in ``videos``), and the ledgers of recordings that became takes. One that failed has its frames
-nowhere else, and stays.
+a copy in ``videos``), the ledgers of recordings that became takes, and the steps of jobs that are over. A
+recording that failed has its frames nowhere else, and stays; a job's row stays with its result.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 
 from glovecal_service.settings import Settings
+from glovecal_service.store.database import now
 from glovecal_service.store.errors import DamagedRows, StoreError
 from glovecal_service.store.store import Store
 
@@ -24,8 +26,16 @@ BECAME_A_TAKE = "done"
 
 @dataclass(frozen=True)
 class Swept:
-    files: int
-    size_bytes: int
+    files: int = 0
+    size_bytes: int = 0
+    job_steps: int = 0
+
+    def __bool__(self) -> bool:
+        return bool(self.files or self.job_steps)
+
+    def __str__(self) -> str:
+        files = f"{self.files} files of {self.size_bytes / 1e6:.1f} MB"
+        return f"{files}, {self.job_steps} steps of jobs that are over"
 
 
 def sweep(store: Store, settings: Settings) -> Swept:
@@ -33,16 +43,17 @@ def sweep(store: Store, settings: Settings) -> Swept:
     before = time.time() - settings.keep_days * DAY_S
     count = size = 0
     try:
+        steps = store.jobs.forget_steps(now() - timedelta(days=settings.keep_days))
         candidates = [*_uploads(store, settings), *_films(settings), *_ledgers(store, settings)]
     except StoreError:  # what came from an upload is not known now: another time
-        return Swept(0, 0)
+        return Swept()
     for file in candidates:
         with suppress(OSError):
             about = file.stat()
             if about.st_mtime < before:
                 file.unlink()
                 count, size = count + 1, size + about.st_size
-    return Swept(count, size)
+    return Swept(count, size, steps)
 
 
 def _uploads(store: Store, settings: Settings) -> Iterator[Path]:
