@@ -16,10 +16,12 @@ from glovecal_client.site.kept_session import KeptSession
 from glovecal_client.site.member import Member, read_member, site_file
 
 LOOK_EVERY_S = 1.0
+UNANSWERED_LOOKS = 3
+"""In a row, of a router that is there: it does not know this member any more."""
 _log = logging.getLogger("glovecal.site")
 
 
-def is_admitted(session: zenoh.Session, site: str) -> bool:
+def is_admitted(session: zenoh.Session | KeptSession, site: str) -> bool:
     """Whether the router answers what every member may ask; it has then read all that was said before."""
     replies = session.liveliness().get(admission_key(site), timeout=1.0)
     return any(reply.ok is not None for reply in replies)
@@ -39,6 +41,7 @@ class RenewedSession:
             lambda: first.pop() if first else open_session(self._member),
             lambda session: is_admitted(session, member.site),
         )
+        self._unanswered = 0
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="site file", daemon=True)
         self._thread.start()
@@ -46,6 +49,23 @@ class RenewedSession:
     def _follow(self) -> None:
         while self._file is not None and not self._over.wait(LOOK_EVERY_S):
             self._look(self._file)
+            self._watch_admission()
+
+    def _watch_admission(self) -> None:
+        """zenoh tells nobody that a router stopped passing on what it says."""
+        before, name, site = self._unanswered, self._member.name, self._member.site
+        try:
+            gone = not list(self.session.info.routers_zid())
+            self._unanswered = 0 if gone or is_admitted(self.session, site) else before + 1
+        except zenoh.ZError:
+            return  # being replaced
+        if self._unanswered == UNANSWERED_LOOKS:
+            _log.warning(
+                "the service does not let %s do anything at site %s any more: it was revoked. Nothing of it "
+                "arrives; a new file is made at the service by `glovecal site add`", name, site,
+            )  # fmt: skip
+        elif before >= UNANSWERED_LOOKS and not gone and not self._unanswered:
+            _log.warning("the service lets %s in again at site %s", name, site)
 
     def _look(self, file: Path) -> None:
         """A file that cannot be used is left alone: the certificate in use may be good for long."""

@@ -225,3 +225,22 @@ def test_a_name_that_was_revoked_may_be_given_again_and_the_old_file_stays_out(s
     assert names[0] != names[1]
     rows = [row for row in site.folder.register().members if row.name == "again"]
     assert [row.revoked is None for row in rows] == [False, True]
+
+
+def test_a_running_client_is_told_that_it_was_revoked_and_let_in_again(
+    site: Site, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = site.file(site.folder.add("running", "viewer"))
+    monkeypatch.setenv("GLOVECAL_SITE_FILE", str(file))
+    with open_client([site.endpoint]) as session:
+        heard = Heard(session, POSE)
+        eventually(lambda: site.router.session.put(POSE, b"pose") or heard.samples, "poses")
+        site.folder.revoke("running")
+        eventually(lambda: "does not let running do anything at site lab any more" in caplog.text, "refusal")
+        assert caplog.text.count("any more") == 1
+        again = file.with_suffix(".again")
+        again.write_text(site.folder.add("running", "viewer").document())
+        again.replace(file)
+        eventually(lambda: "lets running in again" in caplog.text, "admission")
+        before = len(heard.samples)
+        eventually(lambda: site.router.session.put(POSE, b"pose") or len(heard.samples) > before, "poses")
