@@ -6,6 +6,7 @@ And what they must not see: how this computer and the shell that began them are 
 from __future__ import annotations
 
 import gc
+import inspect
 import os
 import re
 import signal
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+import httpx
 import hypothesis
 import pytest
 
@@ -27,6 +29,10 @@ hypothesis.settings.register_profile(
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
 hypothesis.settings.load_profile("same everywhere")
+
+for _part in ("connect", "read", "write", "pool"):
+    # a test's request waits for its answer as pages do: five seconds are too few on a busy computer
+    setattr(inspect.signature(httpx.Client).parameters["timeout"].default, _part, 120.0)
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 REQUIRE_EVERYTHING = "GLOVECAL_REQUIRE_EVERYTHING"

@@ -20,7 +20,7 @@ def page() -> Iterator[LivePage]:
 def ask(
     page: LivePage, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None
 ) -> tuple[int, bytes]:
-    connection = http.client.HTTPConnection(page.host, timeout=10)
+    connection = http.client.HTTPConnection(page.host, timeout=120)
     connection.request(method, path, body, headers or {})
     answer = connection.getresponse()
     found = answer.status, answer.read()
@@ -35,7 +35,7 @@ def test_the_page_and_its_drawings(page: LivePage) -> None:
     drawing = Drawing(100, 50)
     drawing.text((1, 2), "<b>5 mm & more</b>")
     page.show(drawing)
-    connection = http.client.HTTPConnection(page.host, timeout=10)
+    connection = http.client.HTTPConnection(page.host, timeout=120)
     connection.request("GET", "/drawings")
     line = connection.getresponse().readline()
     connection.close()

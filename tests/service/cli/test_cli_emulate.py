@@ -87,7 +87,7 @@ def test_capture_records_an_emulated_glove_as_simulated(tmp_path: Path) -> None:
             summary = run_capture(device, settings, options, stop=stop)
     finally:
         process.terminate()
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
     recording = Recording.open(summary.log)
     frames = list(recording.frames())
     assert len(frames) > 50

@@ -78,17 +78,17 @@ def test_clocks_are_measured_told_and_kept_with_the_takes(
             eventually(lambda hand=hand: streams(session, keys[hand].status), f"the {hand} glove streams")
             meta = ask_json(session, keys[hand].meta)
             store.gloves.seen(hand, meta)
-            set_once = ask_json(session, f"{keys[hand].control}?do=set-clock", timeout_s=20)
+            set_once = ask_json(session, f"{keys[hand].control}?do=set-clock", timeout_s=120)
             assert abs(set_once["clock"]["ahead_s"]) <= 1 / 30
-            told = ask_json(session, f"{keys[hand].control}?do=status", timeout_s=20)
+            told = ask_json(session, f"{keys[hand].control}?do=status", timeout_s=120)
             assert told["battery_v"] == pytest.approx(7.445)
             assert told["files"] == []
-            started = ask_json(session, f"{keys[hand].control}?do=start;with=MONDAY.DAT", timeout_s=20)
+            started = ask_json(session, f"{keys[hand].control}?do=start;with=MONDAY.DAT", timeout_s=120)
             assert started["active_file"] == "MONDAY.DAT"
             with pytest.raises(QueryRefused, match="records on its card"):
-                ask_json(session, f"{keys[hand].control}?do=status", timeout_s=20)
+                ask_json(session, f"{keys[hand].control}?do=status", timeout_s=120)
             with pytest.raises(QueryRefused, match="no command 'format'"):
-                ask_json(session, f"{keys[hand].control}?do=format", timeout_s=20)
+                ask_json(session, f"{keys[hand].control}?do=format", timeout_s=120)
         with in_process_client(settings) as rest:
 
             def refused() -> bool:

@@ -55,13 +55,13 @@ def gloves(
 
 
 def streaming(address: str) -> set[str]:
-    found = httpx.get(f"{address}/v1/live-gloves", timeout=20)
+    found = httpx.get(f"{address}/v1/live-gloves")
     return {each["glove"] for each in found.json()} if found.is_success else set()
 
 
 def stored(address: str) -> set[str]:
     """Those whose frames came, once real time has had time to say so."""
-    return {each["name"] for each in httpx.get(f"{address}/v1/gloves", timeout=20).json()["seen"]}
+    return {each["name"] for each in httpx.get(f"{address}/v1/gloves").json()["seen"]}
 
 
 def test_warm_up_clocks_and_cards_of_both_gloves(
