@@ -73,23 +73,25 @@ def guard_streams() -> None:
     sys.stderr = _guarded(sys.stderr or open(2, "w", closefd=False, encoding="locale"), _ignore)  # noqa: SIM115
 
 
-def never_wait() -> None:
+def never_wait() -> Callable[[], None]:
     """From now on nothing waits for standard error, which a thread of its own writes.
 
     Its reader may stand still: a pipe that nobody empties, a terminal stopped by Ctrl-S, a Windows console in
     which somebody marks text. Lines then wait in memory; when there are too many the newest are left out, and
     that is told as soon as somebody reads again. For processes that must go on: lines may come out after what
     was printed later on standard output. Nothing changes where ``guard_streams`` was not called: the stream
-    is not ours.
+    is not ours. What is returned waits until all is written; an exit of the interpreter does, the end of a
+    process of ``multiprocessing`` does not.
     """
     stream = sys.stderr
     if not isinstance(getattr(getattr(stream, "buffer", None), "raw", None), _Guard):
-        return
+        return lambda: None
     raw = _Patient(stream, _ignore)
     sys.stderr = io.TextIOWrapper(
         io.BufferedWriter(raw), encoding=stream.encoding, errors=stream.errors, line_buffering=True
     )
     atexit.register(raw.settle)
+    return raw.settle
 
 
 def say(sentence: str) -> None:
@@ -121,7 +123,9 @@ class _Guard(io.RawIOBase):
 
     def __init__(self, stream: TextIO, failed: Callable[[OSError], None]) -> None:
         self._stream = stream  # which would close the raw one
-        self._raw = getattr(stream.buffer, "raw", stream.buffer)  # python -u: there is no buffer
+        raw = getattr(stream.buffer, "raw", stream.buffer)  # python -u: there is no buffer
+        # past another guard: in a process that was forked the thread that writes for it is not there
+        self._raw = raw._raw if isinstance(raw, _Guard) else raw
         self._failed, self._lost = failed, False
 
     def write(self, data: Any, /) -> int | None:

@@ -355,7 +355,7 @@ def _stop(parts: list[Part], lifeline: Lifeline) -> None:
 def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
     """What a child does first: see to it that it stops when asked, and when the parent is gone."""
     guard_streams()
-    _log_to_stderr()
+    settle = _log_to_stderr()
     keep_private()
     stopped = Event()
     leave_signals_to_the_parent()
@@ -366,6 +366,8 @@ def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> 
     except Exception as error:
         _log.error("%s: %s", multiprocessing.current_process().name, error)
         sys.exit(1)
+    finally:
+        settle()
 
 
 def real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:
@@ -416,10 +418,15 @@ def _follow_server(server: Any, stopped: Event, started: Callable[[], None]) -> 
     server.should_exit = True
 
 
-def _log_to_stderr() -> None:
-    never_wait()
+def _log_to_stderr() -> Callable[[], None]:
+    """Returns what waits until all is written. A process that was forked has its parent's handler."""
+    settle = never_wait()
     logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s"
+        stream=sys.stderr,
+        level=logging.INFO,
+        format="%(asctime)s %(name)s %(levelname)s %(message)s",
+        force=True,
     )
     for chatty in ("alembic", "uvicorn.error", "httpx"):
         logging.getLogger(chatty).setLevel(logging.WARNING)
+    return settle

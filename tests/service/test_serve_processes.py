@@ -68,6 +68,27 @@ def test_a_log_that_nobody_reads_holds_nobody_up(serving: tuple[subprocess.Popen
             assert http.get("/health/live").is_success
 
 
+def test_what_its_processes_log_reaches_the_log(
+    serving: tuple[subprocess.Popen[str], str, int],
+) -> None:
+    """Each has a copy of the first one's streams, whose writing thread it does not have."""
+    process, endpoint, port = serving
+    eventually(lambda: is_ready(port), "ready")
+    with open_client([endpoint]) as session, httpx.Client(base_url=f"http://127.0.0.1:{port}/v1") as http:
+        glove = WireGlove(session, Settings(zenoh=endpoint, site="lab"), "right", subject="anna")
+
+        def is_refused() -> bool:
+            glove.say_meta()
+            glove.send()
+            return "no subject 'anna'" in http.get("/live-gloves").text
+
+        eventually(is_refused, "the wearer is not known")
+    process.send_signal(signal.SIGINT)
+    log = process.communicate(timeout=120)[1]
+    assert '"path": "/v1/health/ready"' in log
+    assert re.search(r"glovecal\.realtime INFO glove right: .*no subject 'anna'", log)
+
+
 def _is_up(http: httpx.Client) -> bool:
     try:
         return http.get("/health/live").is_success
