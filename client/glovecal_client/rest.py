@@ -8,10 +8,12 @@ them, TOML or JSON.
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -21,6 +23,8 @@ import numpy as np
 
 from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.installation import not_installed
+from glovecal_client.operating_system import move_over, sync_file
+from glovecal_client.private_files import open_private
 from glovecal_client.site.certificates import client_context
 from glovecal_client.site.login import why_refused
 from glovecal_client.site.member import Member, member_of_environment
@@ -129,6 +133,27 @@ class RestClient:
     def download(self, path: str, query: Mapping[str, Any] | None = None) -> bytes:
         """The bytes of an export."""
         return self._send("GET", path, params=query).content
+
+    def save(self, path: str, file: Path) -> None:
+        """An export of any size, as ``file``: written beside it, for its owner only, and moved over it when
+        whole. Raises OSError, and ServiceError where the answer broke off; then ``file`` is as it was."""
+        unfinished = file.with_name(f".{file.name}.{os.getpid()}.part")
+        try:
+            with (
+                self._told("GET", path),
+                self._http.stream("GET", path) as response,
+                open(unfinished, "wb", opener=open_private) as written,
+            ):
+                if response.status_code >= 400:
+                    response.read()
+                self._look_at(response)
+                for part in response.iter_bytes(1 << 20):
+                    written.write(part)
+                written.flush()
+                sync_file(written)
+            move_over(unfinished, file, durably=True)
+        finally:
+            unfinished.unlink(missing_ok=True)
 
     def made(self, path: str, body: Any) -> bytes:
         """The bytes of a file that the service makes from what is asked."""
@@ -273,9 +298,17 @@ class RestClient:
         return response.json() if response.content else None
 
     def _send(self, method: str, path: str, **request: Any) -> httpx.Response:
+        with self._told(method, path):
+            response = self._http.request(method, path, **request)
+        self._look_at(response)
+        return response
+
+    @contextmanager
+    def _told(self, method: str, path: str) -> Iterator[None]:
+        """What goes wrong on the way is a sentence."""
         httpx = _import_httpx()
         try:
-            response = self._http.request(method, path, **request)
+            yield
         except (httpx.ConnectError, httpx.ConnectTimeout) as error:
             raise NoService(503, "No service", self._why_not_connected(error)) from error
         except httpx.TimeoutException as error:
@@ -283,13 +316,15 @@ class RestClient:
         except httpx.TransportError as error:
             sentence = f"the connection to {self.url} broke: {reason_of(error)}"
             raise NoService(502, "Connection broken", sentence) from error
+
+    def _look_at(self, response: httpx.Response) -> None:
+        """Raises ServiceError for a refusal; keeps what it warns of."""
         if response.status_code >= 400:
             raise _refusal(response)
         for header in response.headers.get_list("Warning"):
             sentence = _WARNING.sub(r"\1", header).replace('\\"', '"').replace("\\\\", "\\")
             if sentence not in self.warnings:
                 self.warnings.append(sentence)
-        return response
 
     def _why_not_connected(self, error: Exception) -> str:
         parts = urlsplit(self.url)

@@ -40,6 +40,7 @@ TRAINERS = {
     *("POST /takes/clocks", "POST /takes/clocks/undo"),
     *("POST /takes/examination", "POST /takes/examination/report"),
     *("POST /improve", "POST /jobs/{id}/cancel", "POST /subjects/{name}/detectability"),
+    "GET /subjects/{name}/export",
 }
 ADMINS = {"DELETE /subjects/{name}", "GET /keys", "POST /keys", "DELETE /keys/{name}", "GET /audit",
           "GET /audit/check"}  # fmt: skip
@@ -49,11 +50,11 @@ def expected(method: str, path: str) -> Role:
     """What this page of the specification says, route by route."""
     if f"{method} {path}" in ADMINS:
         return "admin"
+    if f"{method} {path}" in TRAINERS:
+        return "trainer"
     if method == "GET" or (method == "POST" and path in VIEWERS_POST):
         return "viewer"
-    if f"{method} {path}" in TRAINERS or path.startswith("/models"):
-        return "trainer"
-    if f"{method} {path}" == "POST /subjects/{name}/detectability":
+    if path.startswith("/models"):
         return "trainer"
     return "operator"
 

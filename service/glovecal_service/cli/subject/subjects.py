@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from zipfile import ZipFile
 
 import typer
 
-from glovecal_models.documents import read_toml
+from glovecal_models.documents import read_json, read_toml
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HANDS, Handedness
@@ -18,6 +19,7 @@ from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_na
 from glovecal_service.cli.terminal.printing import (
     Overwrite,
     Refusal,
+    err,
     out,
     print_facts,
     print_table,
@@ -201,6 +203,29 @@ def show(name: Name, as_json: AsJson = False) -> None:
 def _hands(subject: SubjectRow, takes: list[Take]) -> list[str]:
     """Those that the subject is said to have, and those whose gloves recorded its takes."""
     return [hand for hand in HANDS if hand in (subject.hand, *(row.known_hand for row in takes))]
+
+
+@app.command("export")
+def export(
+    name: Name,
+    to: Annotated[Path, typer.Option("--to", help="Where to write; a .zip file.", metavar="FILE.zip")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write all that is kept of a subject into one file, for the subject: takes, recordings, videos, models,
+    jobs and changes, with a README. Needs the role trainer."""
+    if to.suffix.lower() != ".zip":
+        raise typer.BadParameter(f"{to.name!r} must end in .zip")
+    require_place(to, overwrite=overwrite)
+    with connect() as service:
+        service.save(f"/subjects/{name}/export", to)
+    with ZipFile(to) as archive:
+        manifest = read_json(archive.read("manifest.json"), "manifest.json of the export")
+    size = sum(row["bytes"] for row in manifest["files"]) / 1e6
+    out.print(
+        f"Wrote {to}: {len(manifest['files'])} files, {size:.1f} MB; README.txt in it says what each is."
+    )
+    for problem in manifest["problems"]:
+        err.print(problem, style="yellow")
 
 
 @app.command("remove")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
+from fastapi.responses import StreamingResponse
 from pydantic import Field
 
 from glovecal_models.hand.dimensions import DIMENSIONS
@@ -15,13 +16,14 @@ from glovecal_models.quick_check.answer import DUE
 from glovecal_service.exports.robot_hand import RobotForm, robot_hand
 from glovecal_service.plain import plain
 from glovecal_service.request_types import Channel, Millimetres, StrictBody, SubjectName, Title
-from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import LayoutFilter, SubjectInPath
 from glovecal_service.rest.subject.answer import HistoryRowView, HistoryView, SkeletonView, Subject
 from glovecal_service.store.records import ModelRecord, SubjectRecord
+from glovecal_service.store.subject_archive import SubjectArchive
 
-XML = "application/xml"
+XML, ZIP = "application/xml", "application/zip"
 
 
 def history_view(subject: str, records: Sequence[ModelRecord]) -> HistoryView:
@@ -165,6 +167,27 @@ def get_robot(
     """As URDF (ROS) or MJCF (MuJoCo): joints have the names of the rotations; radians and metres."""
     text = robot_hand(store.subjects.get(name).skeleton(hand, palm), form)
     return Response(text, media_type=XML)
+
+
+@router.get(
+    "/{name}/export",
+    response_class=StreamingResponse,
+    summary="All that is kept of a subject, for the subject",
+    responses=problems()
+    | {
+        200: {
+            "description": "A zip file whose README.txt says what each file is; manifest.json, its last, has "
+            "the sha256 of each.",
+            "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+def export_subject(name: SubjectInPath, parts: PartsNeeded) -> StreamingResponse:
+    """Takes, recordings as they came, videos, models, wearings, samplings, jobs, and changes that concern
+    the subject. It is made while it is sent; one that breaks off has no manifest and is no zip file."""
+    archive = SubjectArchive(parts.store, parts.settings, name)
+    headers = {"Content-Disposition": f'attachment; filename="{name}.zip"', "Cache-Control": "no-store"}
+    return StreamingResponse(archive.parts(), media_type=ZIP, headers=headers)
 
 
 @router.delete(

@@ -20,6 +20,7 @@ from glovecal_service.studio.next_steps import next_steps
 from glovecal_service.studio.paged_list import PagedList
 from glovecal_service.studio.pages.gloves_table import gloves_table
 from glovecal_service.studio.pages.model_parts import ModelParts
+from glovecal_service.studio.pages.personal_data import PersonalData
 from glovecal_service.studio.service import refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -33,11 +34,12 @@ def add(studio: Studio) -> None:
 
     @page("/models")
     async def models() -> None:
-        async with shell(studio, "models", "Models and subjects"):
+        async with shell(studio, "models", "Models and subjects") as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             await ModelsPage(studio).build()
             with ui.element("div").classes("trees"):
                 await DimensionsForm(studio.service).build()
+                await PersonalData(studio.service).build(around.chosen.person)
                 await gloves_table(studio.service)
 
 

@@ -1,0 +1,134 @@
+"""What is of one subject: rows of the store and files of the data folder. An export holds it, an erasure
+removes it, so what is found here is found by both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from glovecal_client.errors import ClientError
+from glovecal_client.pictures.video_file import read_about, read_times
+from glovecal_models.errors import BadInput
+from glovecal_service.settings import Settings
+from glovecal_service.store.errors import DamagedRows, NotFound
+from glovecal_service.store.records import (
+    Activation,
+    GloveRecord,
+    JobRecord,
+    ModelRecord,
+    RecordingRecord,
+    SamplingRecord,
+    SubjectRecord,
+    TakeRecord,
+)
+from glovecal_service.store.store import Store
+from glovecal_service.store.take_file import VideoFacts, Videos
+
+
+@dataclass(frozen=True)
+class Belongings:
+    subject: SubjectRecord
+    takes: list[TakeRecord]
+    models: list[ModelRecord]
+    """Those that were removed from lists, too."""
+    activations: list[Activation]
+    recordings: list[RecordingRecord]
+    samplings: list[SamplingRecord]
+    jobs: list[JobRecord]
+    gloves: list[GloveRecord]
+    """That it wears now."""
+    damaged: list[str] = field(default_factory=list)
+    """Rows that cannot be read, a sentence each: they may be of this subject."""
+
+    @classmethod
+    def of(cls, store: Store, name: str) -> Belongings:
+        """Raises NotFound."""
+        subject = store.subjects.get(name)
+        damaged: list[str] = []
+
+        def own(read: Callable[[], list[Any]]) -> list[Any]:
+            try:
+                rows = read()
+            except DamagedRows as error:
+                damaged.extend(sentence for sentence in error.damaged if sentence not in damaged)
+                rows = error.sound
+            return [row for row in rows if row.subject == name]
+
+        models = own(lambda: store.models.list(name)) + own(lambda: store.models.list(name, removed=True))
+        layouts = sorted({model.layout for model in models})
+        return cls(
+            subject=subject,
+            takes=own(lambda: store.takes.list(name)),
+            models=models,
+            activations=[
+                row for layout in layouts for row in own(lambda of=layout: store.models.activations(name, of))
+            ],
+            recordings=own(store.recordings.list),
+            samplings=own(store.samplings.list),
+            jobs=own(lambda: store.jobs.list(subject=name)),
+            gloves=own(store.gloves.list),
+            damaged=damaged,
+        )
+
+    @property
+    def ids(self) -> set[str]:
+        """Of its takes, models, recordings, samplings and jobs."""
+        rows = (*self.takes, *self.models, *self.recordings, *self.samplings, *self.jobs)
+        return {row.id for row in rows}
+
+    def wearings(self) -> list[dict[str, str]]:
+        """Each wearing once, in the order of its first take or recording, with the glove where that is
+        known."""
+        gloves = {row.id: row.glove for row in self.recordings}
+        rows = [(take.wearing, gloves.get(take.recording or "", "")) for take in self.takes]
+        rows += [(row.wearing or "", row.glove) for row in self.recordings[::-1]]
+        return [{"wearing": wearing, "glove": glove} for wearing, glove in dict.fromkeys(rows)]
+
+
+def artifacts_of(take: TakeRecord) -> list[str]:
+    """Of its arrays as they are, and as they were with earlier references: sha256, the newest first."""
+    earlier = [str(one["artifact"]) for one in take.facts.get("history", [])]
+    return list(dict.fromkeys([take.artifact, *earlier[::-1]]))
+
+
+def recording_files(settings: Settings, id: str) -> list[Path]:
+    """What the recorder wrote of a recording: frames as they came, with its pre-roll."""
+    return sorted(settings.recordings_folder.glob(f"{id}.*"))
+
+
+def films_of(settings: Settings, takes: list[TakeRecord]) -> list[Path]:
+    """Films that were made while one of ``takes`` was recorded, with their tables of times: by the clock of
+    the computer that filmed, as the takes' videos have it."""
+    videos = Videos(settings.videos_folder)
+    spans = []
+    for take in takes:
+        try:
+            spans.append(videos.facts(take.id))
+        except (NotFound, BadInput):
+            continue
+    return [
+        file
+        for film in sorted(settings.films_folder.glob("*.mkv"))
+        if any(_shows(film, span) for span in spans)
+        for file in sorted(settings.films_folder.glob(f"{film.stem}.*"))
+    ]
+
+
+def _shows(film: Path, video: VideoFacts) -> bool:
+    try:
+        times_s = [at_ns / 1e9 for at_ns, _ in read_times(film)]
+    except ClientError:
+        return False
+    if not times_s or read_about(film).get("computer") != video.computer:
+        return False
+    return times_s[0] <= video.times_s[-1] and video.times_s[0] <= times_s[-1]
+
+
+def parts_of(path: Path, size: int = 1 << 20) -> Iterator[bytes]:
+    """Of a file. Raises OSError."""
+    with path.open("rb") as file:
+        while part := file.read(size):
+            yield part

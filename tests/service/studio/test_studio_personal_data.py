@@ -1,0 +1,36 @@
+"""What is kept of a person, on the page: all of it as a file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import httpx
+from playwright.sync_api import expect
+from studio_support import Open, serious, without_focus
+
+
+def test_all_that_is_kept_of_a_person_is_saved_from_the_page(
+    opened: Open, address: str, tmp_path: Path
+) -> None:
+    httpx.post(f"{address}/v1/subjects", json={"name": "zoe"})
+    seen = opened("models")
+    part = seen.page.get_by_role("region", name="Personal data")
+    part.get_by_label("Whose").click()
+    seen.page.get_by_role("option", name="anna", exact=True).click()
+    link = part.get_by_role("link", name="Export all data of anna")
+    expect(link).to_be_visible()
+    with seen.page.expect_download() as saving:
+        link.click()
+    assert saving.value.suggested_filename == "anna.zip"
+    saving.value.save_as(tmp_path / "anna.zip")
+    with zipfile.ZipFile(tmp_path / "anna.zip") as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+    takes = httpx.get(f"{address}/v1/takes", params={"subject": "anna"}).json()
+    names = {row["name"] for row in manifest["files"]}
+    assert {f"takes/{take['id']}/take-1.safetensors" for take in takes} <= names
+    assert manifest["problems"] == []
+    assert serious(seen.page) == []
+    assert without_focus(seen.page) == []
+    assert seen.complaints == []
