@@ -6,7 +6,7 @@ import asyncio
 import logging
 import re
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 
@@ -59,7 +59,7 @@ from glovecal_service.rest.model import (
 )
 from glovecal_service.rest.overview import overview
 from glovecal_service.rest.sampling import next_steps, samplings
-from glovecal_service.rest.subject import subjects, usual_hand
+from glovecal_service.rest.subject import erasures, subjects, usual_hand
 from glovecal_service.rest.take import (
     clocks,
     dropped,
@@ -75,6 +75,8 @@ from glovecal_service.rest.take import (
     videos,
 )
 from glovecal_service.settings import Settings
+from glovecal_service.store.erasure import finish_erasures
+from glovecal_service.store.errors import StoreError
 from glovecal_service.store.retention import sweep
 from glovecal_service.store.site.web_login import AllowedHosts
 from glovecal_service.store.store import Store
@@ -89,7 +91,8 @@ BODY_PATIENCE_S = 30.0
 FIRST_SWEEP_AFTER_S, SWEEP_EVERY_S = 60.0, 3600.0
 ROUTERS = (
     asking,
-    *(subjects, usual_hand, layouts, live, commands, recordings, films, cameras, camera_files, samplings),
+    *(subjects, erasures, usual_hand),
+    *(layouts, live, commands, recordings, films, cameras, camera_files, samplings),
     *(connecting, simulated_glove, hidden_effects),
     *(
         clocks,
@@ -149,6 +152,7 @@ def create_app(
         opened = store or await run_in_threadpool(Store.open, settings)
         uploads_folder = UploadFolder(settings.uploads_folder)
         await run_in_threadpool(uploads_folder.sweep)
+        await run_in_threadpool(finish_erasures, opened, settings)
         app.state.parts = Parts(
             settings, opened, uploads_folder, metrics, Predictors(opened), Filming(settings.films_folder),
             CameraAccess(settings.zenoh), StreamedGlove(settings),
@@ -204,6 +208,8 @@ async def _sweep_hourly(store: Store, settings: Settings) -> None:
     while True:
         if swept := await run_in_threadpool(sweep, store, settings):
             _log.info("removed after %g days: %s", settings.keep_days, swept)
+        with suppress(StoreError):  # another time
+            await run_in_threadpool(finish_erasures, store, settings)
         await asyncio.sleep(SWEEP_EVERY_S)
 
 

@@ -1,7 +1,7 @@
 """The log of changes as it is read: newest first, whole, and whether it is what was written.
 
-An entry that was edited, taken out or put elsewhere breaks the chain of hashes, and one that is missing at
-its end does not fit the head.
+An entry that was edited (other than by erasing a subject), taken out or put elsewhere breaks the chain of
+hashes, and one that is missing at its end does not fit the head.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from glovecal_service.store import tables
 from glovecal_service.store.audit_trail import entry_sha256
 from glovecal_service.store.database import Database
 
+REWRITTEN = "audit"
+"""Table of a change that says: an erasure took a subject out of that entry, and this is its hash now."""
 PART = 1000
 """Entries that are read at once."""
 
@@ -63,15 +65,33 @@ class Audit:
         with self._database.read() as connection:
             return connection.scalar(select(tables.audit_head.c.count)) or 0
 
+    def every_with_soundness(self) -> Iterator[tuple[AuditEntry, bool]]:
+        """Oldest first; whether each says what was written, be it by an erasure (``REWRITTEN``)."""
+        rewritten = self._rewritten()
+        for entry in self.every():
+            digest = entry_sha256(vars(entry))
+            yield entry, digest in (entry.sha256, rewritten.get(entry.id))
+
+    def _rewritten(self) -> dict[int, str]:
+        """By entry: the hash of what it says since a subject was erased, as a later entry that is what was
+        written has it."""
+        digests = {}
+        for entry in self.every():
+            if entry.sha256 == entry_sha256(vars(entry)):
+                for change in entry.changes:
+                    if change["table"] == REWRITTEN and int(change["key"]) < entry.id:
+                        digests[int(change["key"])] = change["after"]["sha256"]
+        return digests
+
     def problems(self) -> list[str]:
         """What does not fit, a sentence each; none: the log is what was written."""
         wrong, count, previous = [], 0, ""
-        for entry in self.every():
+        for entry, is_sound in self.every_with_soundness():
             if entry.id != count + 1:
                 wrong.append(f"entries {count + 1} to {entry.id - 1} are missing")
             elif entry.previous != previous:
                 wrong.append(f"entry {entry.id} does not follow the one before it")
-            if entry.sha256 != entry_sha256(vars(entry)):
+            if not is_sound:
                 wrong.append(f"entry {entry.id} was changed after it was written")
             count, previous = entry.id, entry.sha256
         with self._database.read() as connection:

@@ -59,6 +59,12 @@ def written_down(connection: Connection) -> Iterator[None]:
         info.pop(_BEFORE, None)
 
 
+def tell_instead(connection: Connection, changes: list[dict[str, Any]]) -> None:
+    """The entry of this transaction holds these changes, not those of its statements so far: where a person
+    is erased their values are not written down once more."""
+    connection.info[_OPEN] = changes
+
+
 def _append(connection: Connection, changes: list[dict[str, Any]]) -> None:
     head = connection.execute(select(tables.audit_head).with_for_update()).one()
     who = actor_of(connection)

@@ -52,6 +52,10 @@ class Blobs(Protocol):
 
     def exists(self, name: str) -> bool: ...
 
+    def remove(self, name: str) -> None:
+        """Harmless where there is none."""
+        ...
+
     def stamp(self, name: str) -> Hashable | None:
         """Another one once the content was changed; None if there is none."""
         ...
@@ -81,6 +85,9 @@ class FolderBlobs:
 
     def exists(self, name: str) -> bool:
         return (self._folder / name).is_file()
+
+    def remove(self, name: str) -> None:
+        (self._folder / name).unlink(missing_ok=True)
 
     def stamp(self, name: str) -> Hashable | None:
         try:
@@ -130,6 +137,10 @@ class ObjectBlobs:
             except (FileNotFoundError, obstore.exceptions.NotFoundError):
                 return False
             return True
+
+    def remove(self, name: str) -> None:
+        with self._answering(), suppress(FileNotFoundError, obstore.exceptions.NotFoundError):
+            obstore.delete(self._store, name)
 
     def stamp(self, name: str) -> Hashable | None:
         with self._answering():
@@ -232,6 +243,11 @@ class Artifacts:
             self._verified.pop(sha256, None)
             self.get(sha256)
             self._verified[sha256] = stamp, now
+
+    def remove(self, sha256: str) -> None:
+        """Of nobody any more; harmless where it is not there. Raises OSError, StoreUnavailable."""
+        self._verified.pop(check_sha256(sha256), None)
+        self._blobs.remove(sha256)
 
     def is_sound(self, sha256: str) -> bool:
         """Whether there is a file of that name that holds what was put there."""

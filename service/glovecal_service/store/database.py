@@ -17,7 +17,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from copy import copy
 from datetime import UTC, datetime
 from pathlib import Path
@@ -119,6 +119,21 @@ class Database:
         """A connection that some thread still uses is closed when it gives it back."""
         event.listen(self.engine, "checkin", _close_late)
         self.engine.dispose()
+
+    def forget_deleted_rows(self) -> bool:
+        """Write an SQLite file anew, without what deleted and earlier rows left in it and in its log; whether
+        that was possible now. A server does so by itself, in its own time."""
+        if not self.is_sqlite:
+            return True
+        try:
+            with closing(self.engine.raw_connection()) as connection:
+                cursor = connection.cursor()
+                cursor.execute("VACUUM")
+                is_busy, *_ = cursor.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+                return not is_busy
+        except sqlite3.Error as error:
+            log.info("database %s cannot be written anew now: %s", self.name, error)
+            return False
 
     @contextmanager
     def _translated(self) -> Iterator[None]:

@@ -7,6 +7,8 @@ are called like a person.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 from glovecal_service.store import tables
@@ -57,9 +59,40 @@ class SubjectAudit:
         keys = str(change.get("key", "")).split("/")
         if change.get("table") == _PEOPLE:
             return self._name in keys
-        return any(key in self.ids for key in keys) or _names(
+        return any(key in self.ids for key in keys) or names_subject(
             [change.get("before"), change.get("after")], self._name
         )
+
+    def without_subject(self, entry: AuditEntry, stand_in: str, value: str) -> AuditEntry:
+        """The entry with ``stand_in`` for the subject's name, and ``value`` for what was kept of it; what it
+        says of others is as it was."""
+        action = "/".join(
+            stand_in if part == self._name and before == "subjects" else part
+            for before, part in pairwise(["", *entry.action.split("/")])
+        )
+        changes = [
+            self._without_values(change, stand_in, value) if self.is_about(change) else change
+            for change in entry.changes
+        ]
+        return replace(entry, action=action, changes=changes)
+
+    def _without_values(self, change: Mapping[str, Any], stand_in: str, value: str) -> dict[str, Any]:
+        """Rows of gloves and keys are of others too: there the name alone goes, and how it wore the glove."""
+        is_shared = change["table"] in (tables.gloves.name, tables.keys.name)
+        kept = dict(change)
+        if change["table"] == _PEOPLE:
+            kept["key"] = stand_in
+        for side in ("before", "after"):
+            if isinstance(values := change.get(side), Mapping):
+                is_own = not is_shared or values.get("subject") == self._name
+                gone = ("wearing",) if is_shared else tuple(values)
+                kept[side] = {
+                    key: value
+                    if is_own and key in gone and key != "subject"
+                    else _renamed(key, item, self._name, stand_in)
+                    for key, item in values.items()
+                }
+        return kept
 
     def _learn(self, change: Mapping[str, Any]) -> None:
         """Rows that were the subject's once."""
@@ -77,14 +110,20 @@ class SubjectAudit:
         }
 
 
-def _names(value: Any, name: str) -> bool:
+def names_subject(value: Any, name: str) -> bool:
     """Whether it has a field ``subject`` or ``subjects`` with that name, however deep."""
     if isinstance(value, Mapping):
         own = value.get("subjects")
         if value.get("subject") == name or (isinstance(own, list) and name in own):
             return True
-        return any(_names(item, name) for item in value.values())
-    return isinstance(value, list) and any(_names(item, name) for item in value)
+        return any(names_subject(item, name) for item in value.values())
+    return isinstance(value, list) and any(names_subject(item, name) for item in value)
+
+
+def _renamed(key: str, item: Any, name: str, stand_in: str) -> Any:
+    if key == "subjects" and isinstance(item, list):
+        return [stand_in if each == name else each for each in item]
+    return stand_in if key == "subject" and item == name else item
 
 
 def _others_hidden(value: Any, name: str) -> Any:

@@ -339,6 +339,16 @@ sessions = Table(
     Column("expires_at", UtcTime, nullable=False),
 )
 
+erasures = Table(
+    "erasures",
+    metadata,
+    Column("id", NAME, primary_key=True),
+    Column("files", Json, nullable=False),
+    Column("began_at", UtcTime, nullable=False),
+    Column("finished_at", UtcTime),
+)
+"""Of subjects that are gone: files that are still to be removed, none once it is finished."""
+
 audit = Table(
     "audit",
     metadata,

@@ -43,7 +43,7 @@ TRAINERS = {
     "GET /subjects/{name}/export",
 }
 ADMINS = {"DELETE /subjects/{name}", "GET /keys", "POST /keys", "DELETE /keys/{name}", "GET /audit",
-          "GET /audit/check"}  # fmt: skip
+          "GET /audit/check", "POST /erasures"}  # fmt: skip
 
 
 def expected(method: str, path: str) -> Role:

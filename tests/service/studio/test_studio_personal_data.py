@@ -1,4 +1,4 @@
-"""What is kept of a person, on the page: all of it as a file."""
+"""What is kept of a person, on the page: all of it as a file, and its erasure."""
 
 from __future__ import annotations
 
@@ -33,4 +33,31 @@ def test_all_that_is_kept_of_a_person_is_saved_from_the_page(
     assert manifest["problems"] == []
     assert serious(seen.page) == []
     assert without_focus(seen.page) == []
+    assert seen.complaints == []
+
+
+def test_a_person_is_erased_once_the_name_is_typed(opened: Open, address: str) -> None:
+    httpx.post(f"{address}/v1/subjects", json={"name": "yuri"})
+    seen = opened("models")
+    part = seen.page.get_by_role("region", name="Personal data")
+    part.get_by_label("Whose").click()
+    seen.page.get_by_role("option", name="yuri", exact=True).click()
+    part.get_by_role("button", name="Erase yuri").click()
+    erase = part.get_by_role("button", name="Erase for ever")
+    expect(erase).to_be_disabled()
+    field = part.get_by_label("Type the name to erase it for ever")
+    field.fill("anna")
+    expect(erase).to_be_disabled()
+    field.fill("yuri")
+    expect(erase).to_be_enabled()
+    assert serious(seen.page) == []
+    assert without_focus(seen.page) == []
+    erase.click()
+    expect(part.get_by_role("status")).to_contain_text("no longer say who it was")
+    expect(part.get_by_role("status")).to_contain_text("made elsewhere still hold the subject")
+    names = [row["name"] for row in httpx.get(f"{address}/v1/subjects").json()]
+    assert "yuri" not in names
+    assert "anna" in names
+    part.get_by_label("Whose").click()
+    expect(seen.page.get_by_role("option", name="yuri", exact=True)).to_have_count(0)
     assert seen.complaints == []

@@ -22,6 +22,7 @@ from glovecal_service.cli.terminal.printing import (
     err,
     out,
     print_facts,
+    print_sentences,
     print_table,
     read_or_print,
     require_place,
@@ -29,7 +30,7 @@ from glovecal_service.cli.terminal.printing import (
     write_whole,
 )
 from glovecal_service.plain import read
-from glovecal_service.rest.subject.answer import HistoryView, SkeletonView
+from glovecal_service.rest.subject.answer import Erasure, HistoryView, SkeletonView
 from glovecal_service.rest.subject.answer import Subject as SubjectRow
 from glovecal_service.rest.take.answer import Take
 
@@ -226,6 +227,28 @@ def export(
     )
     for problem in manifest["problems"]:
         err.print(problem, style="yellow")
+
+
+@app.command("erase")
+def erase(
+    name: Name,
+    yes: Annotated[
+        str | None,
+        typer.Option("--yes", metavar="NAME", help="The name again, for scripts; else it is asked for."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Remove a subject with all that is kept of it, for ever: takes, recordings, videos, models, samplings,
+    jobs. The log of changes keeps that it was done. Needs the role admin."""
+    asked = f"This cannot be undone. Type {name} to erase all that is kept of it"
+    again = typer.prompt(asked, err=True) if yes is None else yes
+    if again.strip().lower() != name:
+        raise Refusal(f"{again.strip()!r} is not {name!r}: nothing was changed. Give the subject's own name.")
+    with connect() as service:
+        document = service.post("/erasures", {"subject": name})
+    erased = read_or_print(Erasure, document, as_json)
+    print_facts({"removed": {key: count for key, count in erased.removed.items() if count}})
+    print_sentences(erased.sentences)
 
 
 @app.command("remove")

@@ -44,7 +44,7 @@ _OF_SESSIONS = (
     r"|hidden-effects|subjects|takes|uploads|videos)(/.*)?"
 )
 RULES: tuple[tuple[str, str, Role], ...] = (
-    (r".*", r"(keys|audit)(/.*)?", "admin"),
+    (r".*", r"(keys|audit|erasures)(/.*)?", "admin"),
     (r"DELETE", r"subjects/.*", "admin"),
     (r"GET|HEAD", r"subjects/[^/]+/export", "trainer"),
     (r"GET|HEAD|OPTIONS", r".*", "viewer"),

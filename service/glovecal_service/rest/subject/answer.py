@@ -43,6 +43,27 @@ class HistoryView(Row):
     sentences: list[str]
 
 
+class BackupView(Row):
+    file: str
+    written_at: datetime
+
+
+class Erasure(Row):
+    id: str = Field(description="Stands for the subject in the log of changes, as `erased-ID`.")
+    is_finished: bool = Field(
+        description="False where files could not be removed yet: tried again once an hour and at each start."
+    )
+    removed: dict[str, int] = Field(description="Rows by table, and `files`.")
+    rewritten_entries: int = Field(
+        description="Of the log of changes: they no longer say who it was, and it is still what was written."
+    )
+    backups: list[BackupView] = Field(description="In the data folder; they still hold the subject.")
+    capture_logs: list[str] = Field(
+        description="Gloves whose capture computers may still keep frames, in the folder `capture` there."
+    )
+    sentences: list[str] = Field(description="What was done, and what else is left, for a person.")
+
+
 class SkeletonRotationView(Row):
     name: str
     low: float = Field(description="Limits, degrees.")
