@@ -47,9 +47,8 @@ class Audit:
         with self._database.read() as connection:
             return [_entry(row._mapping) for row in connection.execute(statement)]
 
-    def every(self) -> Iterator[AuditEntry]:
-        """Oldest first, in parts."""
-        after = 0
+    def every(self, after: int = 0) -> Iterator[AuditEntry]:
+        """Those with higher ids, oldest first, in parts."""
         while True:
             statement = select(tables.audit).where(tables.audit.c.id > after).order_by(tables.audit.c.id)
             with self._database.read() as connection:

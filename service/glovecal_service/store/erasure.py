@@ -22,7 +22,7 @@ from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import as_typed
 from glovecal_service.settings import Settings
 from glovecal_service.store import tables
-from glovecal_service.store.audit import REWRITTEN, Audit
+from glovecal_service.store.audit import REWRITTEN, Audit, AuditEntry
 from glovecal_service.store.audit_trail import entry_sha256, tell_instead
 from glovecal_service.store.belongings import (
     Belongings,
@@ -87,21 +87,22 @@ def erase(store: Store, settings: Settings, name: str) -> ErasureRecord:
     files = _files(of, audit, settings)
     hashed = [{**file, "sha256": _sha256(store, settings, file)} for file in files]
     id = new_id()
+    rewriting = _Rewriting(store.audit, audit, f"{ERASED}-{id}")
     with store.database.write() as connection:
         _require_as_seen(connection, of)
         removed = _remove_rows(connection, of, jobs)
-        rewritten = _rewrite(connection, store.audit, audit, f"{ERASED}-{id}")
+        rewriting.write(connection)
         grow_revision(connection)
         connection.execute(insert(tables.erasures).values(id=id, files=files, began_at=now()))
         counted = {**removed, "files": len(files)}
         proof = {"removed": counted, "sha256": sorted(file["sha256"] for file in hashed if file["sha256"])}
         tell_instead(
             connection,
-            [{"table": tables.subjects.name, "key": f"{ERASED}-{id}", "after": proof}, *rewritten],
+            [{"table": tables.subjects.name, "key": f"{ERASED}-{id}", "after": proof}, *rewriting.notes],
         )
     is_finished = finish_erasures(store, settings)
     gloves = sorted({row.glove for row in of.recordings} | {glove.name for glove in of.gloves})
-    erasure = ErasureRecord(id, is_finished, counted, len(rewritten), _backups(store), gloves, [])
+    erasure = ErasureRecord(id, is_finished, counted, len(rewriting.notes), _backups(store), gloves, [])
     return replace(erasure, sentences=[*_done(erasure), *_remaining(store, settings, of)])
 
 
@@ -232,19 +233,35 @@ def _delete_ids(connection: Connection, table: Table, ids: list[str]) -> int:
     return sum(connection.execute(delete(table).where(table.c.id == id)).rowcount for id in ids)
 
 
-def _rewrite(connection: Connection, audit: Audit, of: SubjectAudit, stand_in: str) -> list[dict[str, Any]]:
-    """Take the subject out of older entries; the changes that say so."""
-    notes = []
-    for entry, is_sound in audit.every_with_soundness():
-        if not of.concerns(entry):
-            continue
-        written = of.without_subject(entry, stand_in, ERASED)
-        columns = {"action": written.action, "changes": written.changes}
-        connection.execute(update(tables.audit).where(tables.audit.c.id == entry.id).values(**columns))
+class _Rewriting:
+    """Takes the subject out of older entries. All of the log is read before the transaction, in which others
+    wait; what was written since, in it."""
+
+    def __init__(self, audit: Audit, of: SubjectAudit, stand_in: str) -> None:
+        self._audit, self._of, self._stand_in = audit, of, stand_in
+        self._last = 0
+        self._entries: list[AuditEntry] = []
+        self.notes: list[dict[str, Any]] = []
+        """Changes that say so."""
+        for entry, is_sound in audit.every_with_soundness():
+            self._add(entry, is_sound)
+
+    def write(self, connection: Connection) -> None:
+        for entry in self._audit.every(self._last):
+            self._add(entry, is_sound=True)
+        for entry in self._entries:
+            columns = {"action": entry.action, "changes": entry.changes}
+            connection.execute(update(tables.audit).where(tables.audit.c.id == entry.id).values(**columns))
+
+    def _add(self, entry: AuditEntry, is_sound: bool) -> None:
+        self._last = entry.id
+        if not self._of.concerns(entry):
+            return
+        written = self._of.without_subject(entry, self._stand_in, ERASED)
+        self._entries.append(written)
         if is_sound:  # one that was tampered with before stays so
             note = {"sha256": entry_sha256(vars(written))}
-            notes.append({"table": REWRITTEN, "key": str(entry.id), "after": note})
-    return notes
+            self.notes.append({"table": REWRITTEN, "key": str(entry.id), "after": note})
 
 
 def _jobs(store: Store) -> list[JobRecord]:
