@@ -49,7 +49,10 @@ class Capture:
         self.numbered: list[NumberedFrame] = []
         self.now_ns = 1_000_000 * MS
         self.reachable = True
+        self.disk_full = False
         self.runs: list[CaptureRun] = []
+        self.waiting: list[NumberedFrame] = []
+        """In the daemon's memory, for room in its log."""
         self.restart()
 
     def restart(self) -> None:
@@ -58,6 +61,7 @@ class Capture:
         self.log = self.open.enter_context(closing(self.folder.create(self.runs[-1].run_id, {})))
         self.queries = LogQueries(self.folder)
         self.sequence = -1
+        self.waiting.clear()
 
     def frame(self, logged: bool, step_ns: int = 8 * MS) -> Frame:
         self.now_ns += step_ns
@@ -65,14 +69,22 @@ class Capture:
         wall_ns = self.now_ns + CLOCK_AHEAD_NS
         readings = np.array([self.sequence], np.float32)
         frame = Frame(self.sequence, self.runs[-1].run_id, self.now_ns, wall_ns, readings)
+        self.numbered.append(NumberedFrame(frame, logged=False))
         if logged:
-            self.log.append(encode_frame(frame))
-        self.numbered.append(NumberedFrame(frame, logged))
+            self.waiting.append(self.numbered[-1])
+            self.make_room(not self.disk_full)
         return frame
+
+    def make_room(self, room: bool) -> None:
+        self.disk_full = not room
+        while room and self.waiting:
+            numbered = self.waiting.pop(0)
+            self.log.append(encode_frame(numbered.frame))
+            numbered.logged = True
 
     def standing(self) -> CaptureStanding:
         self._check()
-        return CaptureStanding(tuple(self.runs), self.sequence, False, CLOCK_AHEAD_NS)
+        return CaptureStanding(tuple(self.runs), self.sequence, self.disk_full, CLOCK_AHEAD_NS)
 
     def block(self, run_id: int, first: int, last: int) -> list[Frame]:
         self._check()
@@ -107,6 +119,7 @@ STEPS = st.lists(
         st.tuples(st.just("killed"), st.integers(0, 5)),
         st.tuples(st.just("restarted"), st.integers(0, 2)),
         st.tuples(st.just("unreachable"), st.just(0)),
+        st.tuples(st.just("disk full, or room again"), st.just(0)),
         st.tuples(st.just("forged"), st.integers(0, 3 * len(FORGED_NUMBERS) - 1)),
     ),
     min_size=1,
@@ -136,6 +149,9 @@ class Story:
             self.capture.restart()
         elif what == "unreachable":
             self.capture.reachable = not self.capture.reachable
+            return
+        elif what == "disk full, or room again":
+            self.capture.make_room(self.capture.disk_full)
             return
         elif what == "jumped":
             self.capture.sequence += count
@@ -228,6 +244,8 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
 )
 @example(before=[("forged", 2), ("received, not logged", 2), ("lost", 1)], after=[("unreachable", 0)])
 @example(before=[("received", 1)], after=[("forged", 16)])
+@example(before=[("disk full, or room again", 0), ("lost", 2), ("received", 2)], after=[("received", 1)])
+@example(before=[("disk full, or room again", 0), ("received", 2)], after=[("received", 1)])
 @example(before=[("restarted", 2), ("restarted", 0), ("received", 1)], after=[("received", 1)])
 @given(before=STEPS, after=STEPS)
 def test_every_frame_up_to_the_stop_is_recorded_or_missing(
@@ -242,7 +260,7 @@ def test_every_frame_up_to_the_stop_is_recorded_or_missing(
             stop_ns = story.capture.now_ns
             first = story.settle(stop_ns)
             check(story, first, stop_ns)
-            assert first.account["complete"] or not story.capture.reachable
+            assert first.account["complete"] or not story.capture.reachable or story.capture.disk_full
             for what, count in after:
                 if "received" not in what and "lost" not in what:
                     story.tell(what, count)
@@ -250,6 +268,15 @@ def test_every_frame_up_to_the_stop_is_recorded_or_missing(
                     for _ in range(count):
                         story.capture.frame(True)
             story.capture.reachable = True
+            story.capture.make_room(True)
+            if first.is_final:
+                logged = {
+                    (item.frame.run_id, item.frame.sequence)
+                    for item in story.capture.numbered
+                    if item.logged
+                }
+                missing = story.keys(first.account["runs"], "missing")
+                assert not missing & logged, "what is missing for good never comes into the log"
             last = story.settle(stop_ns)
             assert last.account["complete"]
             check(story, last, stop_ns)

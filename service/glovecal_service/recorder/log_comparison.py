@@ -16,7 +16,14 @@ from glovecal_client.errors import NoAnswer, QueryRefused, WireError
 from glovecal_client.gap_repair import BlockDigest, as_logged, digest_of
 from glovecal_client.wire.frame import encode_frame
 from glovecal_service.plain import reason_of
-from glovecal_service.recorder.reconciliation import Log, Outcome, OutOfTime, Patience, reconcile
+from glovecal_service.recorder.reconciliation import (
+    WAITING_FOR_ROOM,
+    Log,
+    Outcome,
+    OutOfTime,
+    Patience,
+    reconcile,
+)
 from glovecal_service.recorder.run_ledger import RecordedFrames, RunLedger
 
 PAUSE_S = 0.005
@@ -47,6 +54,7 @@ def reconcile_and_compare(
         return outcome
     for _ in range(ROUNDS):
         try:
+            disk_full = log.standing().disk_full
             comparison = compare(file, log, time_left)
         except QueryRefused as error:
             return replace(outcome, not_compared=reason_of(error))
@@ -56,6 +64,8 @@ def reconcile_and_compare(
             return replace(outcome, not_compared="the capture log has more to tell", may_be_compared=True)
         why = f"{comparison.not_logged} frames are not in it" if comparison.not_logged else ""
         if not comparison.taken_out:
+            if why and disk_full:
+                return replace(outcome, not_compared=WAITING_FOR_ROOM, may_be_compared=True)
             return replace(outcome, not_compared=why)
         outcome = reconcile(file, log, stop_wall_ns, time_left)
         if not outcome.complete:

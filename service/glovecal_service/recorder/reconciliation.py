@@ -98,6 +98,7 @@ UNANSWERED_FOR_S = 2.0
 """A router that was restarted has everybody back by then."""
 REFUSALS = 3
 """So often refused in a row, the frames asked for do not exist any more: their log was removed or damaged."""
+WAITING_FOR_ROOM = "the capture computer's disk is full: frames wait there to be logged"
 
 
 class Log(Protocol):
@@ -187,6 +188,8 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
                 _go_on_to(end_ns, file, books, log, standing, patience)
         except QueryRefused as error:
             refused = error
+    if standing.disk_full and file.has_gaps:
+        raise NoAnswer(WAITING_FOR_ROOM)
     if refused is not None:
         raise refused
 
@@ -244,7 +247,7 @@ def _go_on_to(
         return
     if books.run_id == standing.runs[-1].run_id and standing.sequence > books.last:
         if standing.disk_full:
-            raise NoAnswer("the capture computer's disk is full: frames wait there to be logged")
+            raise NoAnswer(WAITING_FOR_ROOM)
         books.note_given(standing.sequence)
 
 
