@@ -282,3 +282,18 @@ def test_every_frame_up_to_the_stop_is_recorded_or_missing(
             check(story, last, stop_ns)
             again = story.settle(stop_ns)
             assert again.account == last.account, "a second repair changes nothing"
+
+
+def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() -> None:
+    """Nobody says any more how far it came: a stranger's number far ahead is told by its time."""
+    with tempfile.TemporaryDirectory() as folder:
+        story = Story(Path(folder))
+        with story.capture.open:
+            for step in [("received", 2), ("forged", 2), ("received", 3), ("restarted", 0), ("received", 1)]:
+                story.tell(*step)
+            stop_ns = story.capture.now_ns
+            settlement = story.settle(stop_ns)
+            check(story, settlement, stop_ns)
+    account = settlement.account
+    assert (account["compared"], account["taken_out"], account["missing_frames"]) == (True, 1, 0)
+    assert account["recorded"] == 6

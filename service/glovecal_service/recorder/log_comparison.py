@@ -7,6 +7,7 @@ capture never gave, leave the recording.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ import zenoh
 
 from glovecal_client.errors import NoAnswer, QueryRefused, WireError
 from glovecal_client.gap_repair import BlockDigest, as_logged, digest_of
-from glovecal_client.wire.frame import encode_frame
+from glovecal_client.wire.frame import decode_frame, encode_frame
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.reconciliation import (
     WAITING_FOR_ROOM,
@@ -87,7 +88,7 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
         except QueryRefused as error:
             refused = error
             continue
-        strange |= _never_given(file, run_id, unknown)
+        strange |= _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange)
         not_logged += len(unknown - strange)
         if strange:
             out[run_id] = strange
@@ -110,6 +111,27 @@ def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
         if jumped_to <= unknown:
             beyond |= jumped_to
     return beyond
+
+
+def _out_of_order(frames: RecordedFrames, unknown: set[int], strange: set[int]) -> set[int]:
+    """Of the numbers that the log does not have, those whose time is not between the times of the logged
+    frames before and after: capture numbers its frames as time goes. That is known of a killed capture too.
+    """
+
+    def time_ns(row: int) -> int:
+        return decode_frame(frames.messages(slice(row, row + 1))[0]).monotonic_ns
+
+    if not unknown:
+        return set()
+    sequences = frames.sequences.tolist()
+    logged = [row for row, number in enumerate(sequences) if number not in unknown and number not in strange]
+    found = set()
+    for row in (row for row, number in enumerate(sequences) if number in unknown):
+        at = bisect_left(logged, row)
+        is_early = at > 0 and time_ns(row) <= time_ns(logged[at - 1])
+        if is_early or (at < len(logged) and time_ns(row) >= time_ns(logged[at])):
+            found.add(sequences[row])
+    return found
 
 
 def _compared(
