@@ -271,9 +271,7 @@ def test_every_frame_up_to_the_stop_is_recorded_or_missing(
             story.capture.make_room(True)
             if first.is_final:
                 logged = {
-                    (item.frame.run_id, item.frame.sequence)
-                    for item in story.capture.numbered
-                    if item.logged
+                    (item.frame.run_id, item.frame.sequence) for item in story.capture.numbered if item.logged
                 }
                 missing = story.keys(first.account["runs"], "missing")
                 assert not missing & logged, "what is missing for good never comes into the log"
@@ -297,3 +295,19 @@ def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() 
     account = settlement.account
     assert (account["compared"], account["taken_out"], account["missing_frames"]) == (True, 1, 0)
     assert account["recorded"] == 6
+
+
+def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        story = Story(Path(folder))
+        with story.capture.open:
+            story.tell("received", 2)
+            last = story.capture.numbered[-1].frame
+            forged = replace(last, sequence=0, run_id=99, readings=STRANGE)
+            story.file.add(forged, encode_frame(forged))
+            story.tell("received", 3)
+            settlement = story.settle(story.capture.now_ns)
+            check(story, settlement, story.capture.now_ns)
+    account = settlement.account
+    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 5)
+    assert settlement.outcome.why == ""

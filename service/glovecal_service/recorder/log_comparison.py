@@ -80,17 +80,23 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
     Raises NoAnswer, WireError, OutOfTime; QueryRefused where a run has no log, when all others were compared.
     """
     refused: QueryRefused | None = None
+    unheard: dict[int, RecordedFrames] = {}
+    spans: list[tuple[Times, Times]] = []
     out: dict[int, set[int]] = {}
     not_logged = 0
     for run_id, frames in file.recorded().items():
         try:
             strange, unknown = _compared(run_id, frames, log, time_left)
         except QueryRefused as error:
-            refused = error
+            refused, unheard[run_id] = error, frames
             continue
         strange |= _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange)
         not_logged += len(unknown - strange)
+        spans += _span(frames, unknown | strange)
         if strange:
+            out[run_id] = strange
+    for run_id, frames in unheard.items():
+        if strange := _while_another_run_went_on(frames, spans):
             out[run_id] = strange
     for run_id, strange in out.items():
         file.take_out(run_id, sorted(strange))
@@ -98,6 +104,15 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
     if refused is not None and not taken_out:
         raise refused
     return Comparison(taken_out, not_logged)
+
+
+Times = tuple[int, int]
+"""Of a frame: monotonic and wall clock of capture, nanoseconds."""
+
+
+def _times(frames: RecordedFrames, row: int) -> Times:
+    frame = decode_frame(frames.messages(slice(row, row + 1))[0])
+    return frame.monotonic_ns, frame.wall_ns
 
 
 def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
@@ -119,7 +134,7 @@ def _out_of_order(frames: RecordedFrames, unknown: set[int], strange: set[int]) 
     """
 
     def time_ns(row: int) -> int:
-        return decode_frame(frames.messages(slice(row, row + 1))[0]).monotonic_ns
+        return _times(frames, row)[0]
 
     if not unknown:
         return set()
@@ -131,6 +146,24 @@ def _out_of_order(frames: RecordedFrames, unknown: set[int], strange: set[int]) 
         is_early = at > 0 and time_ns(row) <= time_ns(logged[at - 1])
         if is_early or (at < len(logged) and time_ns(row) >= time_ns(logged[at])):
             found.add(sequences[row])
+    return found
+
+
+def _span(frames: RecordedFrames, not_logged: set[int]) -> list[tuple[Times, Times]]:
+    """The times of the first and the last logged frame, if there is one."""
+    logged = [row for row, number in enumerate(frames.sequences.tolist()) if number not in not_logged]
+    return [(_times(frames, logged[0]), _times(frames, logged[-1]))] if logged else []
+
+
+def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, Times]]) -> set[int]:
+    """Of a run that no log is there of, the numbers of the frames that were captured, by both clocks, while a
+    logged run went on: a capture has one run at a time.
+    """
+    found = set()
+    for row, number in enumerate(frames.sequences.tolist()):
+        at_ns, wall_ns = _times(frames, row)
+        if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in spans):
+            found.add(number)
     return found
 
 
