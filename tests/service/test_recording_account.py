@@ -311,3 +311,21 @@ def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile() -
     account = settlement.account
     assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 5)
     assert settlement.outcome.why == ""
+
+
+def test_a_number_that_a_killed_capture_never_gave_moves_no_later_run_in_time() -> None:
+    """The run after it begins, by the computer's clock, before the frame was captured."""
+    with tempfile.TemporaryDirectory() as folder:
+        story = Story(Path(folder))
+        with story.capture.open:
+            story.tell("received", 2)
+            last = story.capture.numbered[-1].frame
+            later_ns = last.monotonic_ns + 100_000 * MS
+            forged = replace(last, sequence=last.sequence + 1, monotonic_ns=later_ns, readings=STRANGE)
+            story.file.add(forged, encode_frame(forged))
+            for step in [("restarted", 0), ("received", 3)]:
+                story.tell(*step)
+            settlement = story.settle(story.capture.now_ns)
+            check(story, settlement, story.capture.now_ns)
+    account = settlement.account
+    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 5)

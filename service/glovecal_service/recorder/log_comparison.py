@@ -81,20 +81,22 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
     """
     refused: QueryRefused | None = None
     unheard: dict[int, RecordedFrames] = {}
-    spans: list[tuple[Times, Times]] = []
-    out: dict[int, set[int]] = {}
-    not_logged = 0
+    found: dict[int, tuple[RecordedFrames, set[int], set[int]]] = {}
     for run_id, frames in file.recorded().items():
         try:
             strange, unknown = _compared(run_id, frames, log, time_left)
         except QueryRefused as error:
             refused, unheard[run_id] = error, frames
             continue
-        strange |= _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange)
-        not_logged += len(unknown - strange)
-        spans += _span(frames, unknown | strange)
-        if strange:
-            out[run_id] = strange
+        found[run_id] = frames, strange, unknown
+    spans = [span for frames, strange, unknown in found.values() for span in _span(frames, unknown | strange)]
+    out: dict[int, set[int]] = {}
+    not_logged = 0
+    for run_id, (frames, strange, unknown) in found.items():
+        never = _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange, spans)
+        not_logged += len(unknown - strange - never)
+        if strange | never:
+            out[run_id] = strange | never
     for run_id, frames in unheard.items():
         if strange := _while_another_run_went_on(frames, spans):
             out[run_id] = strange
@@ -128,9 +130,12 @@ def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
     return beyond
 
 
-def _out_of_order(frames: RecordedFrames, unknown: set[int], strange: set[int]) -> set[int]:
+def _out_of_order(
+    frames: RecordedFrames, unknown: set[int], strange: set[int], spans: list[tuple[Times, Times]]
+) -> set[int]:
     """Of the numbers that the log does not have, those whose time is not between the times of the logged
-    frames before and after: capture numbers its frames as time goes. That is known of a killed capture too.
+    frames before and after, the first ones of later runs among these: capture numbers its frames as time
+    goes, one run after another. That is known of a killed capture too.
     """
 
     def time_ns(row: int) -> int:
@@ -142,9 +147,10 @@ def _out_of_order(frames: RecordedFrames, unknown: set[int], strange: set[int]) 
     logged = [row for row, number in enumerate(sequences) if number not in unknown and number not in strange]
     found = set()
     for row in (row for row, number in enumerate(sequences) if number in unknown):
-        at = bisect_left(logged, row)
-        is_early = at > 0 and time_ns(row) <= time_ns(logged[at - 1])
-        if is_early or (at < len(logged) and time_ns(row) >= time_ns(logged[at])):
+        at, at_ns = bisect_left(logged, row), time_ns(row)
+        before_ns = time_ns(logged[at - 1]) if at > 0 else at_ns - 1
+        is_late = at < len(logged) and at_ns >= time_ns(logged[at])
+        if at_ns <= before_ns or is_late or any(before_ns < first[0] <= at_ns for first, _ in spans):
             found.add(sequences[row])
     return found
 
