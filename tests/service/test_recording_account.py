@@ -297,19 +297,28 @@ def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() 
     assert account["recorded"] == 6
 
 
-def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile() -> None:
+@pytest.mark.parametrize("later", [0, 3])
+def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(later: int) -> None:
+    """``later``: frames of the capture's own that were recorded after it."""
     with tempfile.TemporaryDirectory() as folder:
         story = Story(Path(folder))
         with story.capture.open:
             story.tell("received", 2)
             last = story.capture.numbered[-1].frame
-            forged = replace(last, sequence=0, run_id=99, readings=STRANGE)
+            forged = replace(
+                last,
+                sequence=0,
+                run_id=99,
+                monotonic_ns=last.monotonic_ns + 1,
+                wall_ns=last.wall_ns + 1,
+                readings=STRANGE,
+            )
             story.file.add(forged, encode_frame(forged))
-            story.tell("received", 3)
+            story.tell("received", later)
             settlement = story.settle(story.capture.now_ns)
             check(story, settlement, story.capture.now_ns)
     account = settlement.account
-    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 5)
+    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 2 + later)
     assert settlement.outcome.why == ""
 
 

@@ -19,6 +19,7 @@ from glovecal_client.wire.frame import decode_frame, encode_frame
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.reconciliation import (
     WAITING_FOR_ROOM,
+    CaptureStanding,
     Log,
     Outcome,
     OutOfTime,
@@ -55,8 +56,8 @@ def reconcile_and_compare(
         return outcome
     for _ in range(ROUNDS):
         try:
-            disk_full = log.standing().disk_full
-            comparison = compare(file, log, time_left)
+            standing = log.standing()
+            comparison = compare(file, log, standing, time_left)
         except QueryRefused as error:
             return replace(outcome, not_compared=reason_of(error))
         except (NoAnswer, WireError, zenoh.ZError) as error:
@@ -65,7 +66,7 @@ def reconcile_and_compare(
             return replace(outcome, not_compared="the capture log has more to tell", may_be_compared=True)
         why = f"{comparison.not_logged} frames are not in it" if comparison.not_logged else ""
         if not comparison.taken_out:
-            if why and disk_full:
+            if why and standing.disk_full:
                 return replace(outcome, not_compared=WAITING_FOR_ROOM, may_be_compared=True)
             return replace(outcome, not_compared=why)
         outcome = reconcile(file, log, stop_wall_ns, time_left)
@@ -74,7 +75,7 @@ def reconcile_and_compare(
     return replace(outcome, not_compared="the capture log tells something else each time")
 
 
-def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
+def compare(file: RunLedger, log: Log, standing: CaptureStanding, time_left: Patience) -> Comparison:
     """Hold every frame of ``file`` against the capture log, and take out what is not from there.
 
     Raises NoAnswer, WireError, OutOfTime; QueryRefused where a run has no log, when all others were compared.
@@ -89,7 +90,11 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
             refused, unheard[run_id] = error, frames
             continue
         found[run_id] = frames, strange, unknown
-    spans = [span for frames, strange, unknown in found.values() for span in _span(frames, unknown | strange)]
+    spans = [
+        span
+        for run_id, (frames, strange, unknown) in found.items()
+        for span in _span(frames, unknown | strange, goes_on=run_id == standing.runs[-1].run_id)
+    ]
     out: dict[int, set[int]] = {}
     not_logged = 0
     for run_id, (frames, strange, unknown) in found.items():
@@ -110,6 +115,7 @@ def compare(file: RunLedger, log: Log, time_left: Patience) -> Comparison:
 
 Times = tuple[int, int]
 """Of a frame: monotonic and wall clock of capture, nanoseconds."""
+NEVER: Times = (1 << 63, 1 << 63)
 
 
 def _times(frames: RecordedFrames, row: int) -> Times:
@@ -155,10 +161,12 @@ def _out_of_order(
     return found
 
 
-def _span(frames: RecordedFrames, not_logged: set[int]) -> list[tuple[Times, Times]]:
-    """The times of the first and the last logged frame, if there is one."""
+def _span(frames: RecordedFrames, not_logged: set[int], *, goes_on: bool) -> list[tuple[Times, Times]]:
+    """The times of the first and the last logged frame, if there is one; a run that goes on has no last."""
     logged = [row for row, number in enumerate(frames.sequences.tolist()) if number not in not_logged]
-    return [(_times(frames, logged[0]), _times(frames, logged[-1]))] if logged else []
+    if not logged:
+        return []
+    return [(_times(frames, logged[0]), NEVER if goes_on else _times(frames, logged[-1]))]
 
 
 def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, Times]]) -> set[int]:

@@ -83,8 +83,9 @@ class Audit:
         return digests
 
     def problems(self) -> list[str]:
-        """What does not fit, a sentence each; none: the log is what was written."""
-        wrong, count, previous = [], 0, ""
+        """What does not fit, a sentence each; none: the log is what was written. It may grow meanwhile."""
+        before = self._head()
+        wrong, count, previous, reached = [], 0, "", (0, "")
         for entry, is_sound in self.every_with_soundness():
             if entry.id != count + 1:
                 wrong.append(f"entries {count + 1} to {entry.id - 1} are missing")
@@ -93,13 +94,18 @@ class Audit:
             if not is_sound:
                 wrong.append(f"entry {entry.id} was changed after it was written")
             count, previous = entry.id, entry.sha256
+            if count == before[0]:
+                reached = count, previous
+        if reached != before or count > self._head()[0]:
+            wrong.append(f"the log ends with entry {count}, but {max(0, before[0])} were written")
+        return wrong
+
+    def _head(self) -> tuple[int, str]:
+        """The number of entries that were written, and the hash of the last; -1 where nothing says so."""
         with self._database.read() as connection:
             columns = tables.audit_head.c.count.label("entries"), tables.audit_head.c.sha256
             head = connection.execute(select(*columns)).one_or_none()
-        if head is None or (head.entries, head.sha256) != (count, previous):
-            written = 0 if head is None else head.entries
-            wrong.append(f"the log ends with entry {count}, but {written} were written")
-        return wrong
+        return (-1, "") if head is None else (head.entries, head.sha256)
 
 
 def _entry(values: Mapping[Any, Any]) -> AuditEntry:
