@@ -20,7 +20,9 @@
                             study ablation: what every rule of the diagnosis is worth (hours; --minutes N);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
-                            study camera-errors: what the colour glove's tracker errs by (quarter of an hour)
+                            study camera-errors: what the colour glove's tracker errs by (quarter of an hour);
+                            study faults: kills, cuts, full disks at random: is anything lost? (two minutes;
+                            --faults N, --seed S, --minutes N; --table lists what is tried)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;
                             fresh trixie -- tests/client: these tests only)
     python3 do.py containers  both container images built, run, killed and upgraded (needs podman;
@@ -255,6 +257,8 @@ def study(arguments: list[str]) -> int:
         return run("python", "tests/study/demo_table.py", *arguments[1:])
     if arguments[:1] == ["camera-errors"]:
         return run("python", "tests/study/tracked_errors.py", *arguments[1:])
+    if arguments[:1] == ["faults"]:
+        return run("python", "tests/study/fault_study.py", *arguments[1:], dev=True)
     if arguments[:1] == ["camera"]:
         return run("python", "tests/study/camera_study.py", *arguments[1:], beside=SIMULATED)
     return run("python", "tests/study/study.py", *arguments)

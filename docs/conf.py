@@ -82,7 +82,14 @@ NAVIGATION = {
         "docs/thresholds",
         "Messages on the wire <client/glovecal_client/wire/README>",
     ],
-    "Project": ["As measured <docs/measured>", *STUDY, *TRIED, "ARCHITECTURE", "CHANGELOG"],
+    "Project": [
+        "As measured <docs/measured>",
+        "Faults <docs/faults>",
+        *STUDY,
+        *TRIED,
+        "ARCHITECTURE",
+        "CHANGELOG",
+    ],
 }
 
 

@@ -82,22 +82,22 @@ def compare(file: RunLedger, log: Log, standing: CaptureStanding, time_left: Pat
     """
     refused: QueryRefused | None = None
     unheard: dict[int, RecordedFrames] = {}
-    found: dict[int, tuple[RecordedFrames, set[int], set[int]]] = {}
+    compared: dict[int, tuple[RecordedFrames, set[int], set[int]]] = {}
     for run_id, frames in file.recorded().items():
         try:
             strange, unknown = _compared(run_id, frames, log, time_left)
         except QueryRefused as error:
             refused, unheard[run_id] = error, frames
             continue
-        found[run_id] = frames, strange, unknown
+        compared[run_id] = frames, strange, unknown
     spans = [
         span
-        for run_id, (frames, strange, unknown) in found.items()
+        for run_id, (frames, strange, unknown) in compared.items()
         for span in _span(frames, unknown | strange, goes_on=run_id == standing.runs[-1].run_id)
     ]
     out: dict[int, set[int]] = {}
     not_logged = 0
-    for run_id, (frames, strange, unknown) in found.items():
+    for run_id, (frames, strange, unknown) in compared.items():
         never = _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange, spans)
         not_logged += len(unknown - strange - never)
         if strange | never:
@@ -151,14 +151,14 @@ def _out_of_order(
         return set()
     sequences = frames.sequences.tolist()
     logged = [row for row, number in enumerate(sequences) if number not in unknown and number not in strange]
-    found = set()
+    impossible = set()
     for row in (row for row, number in enumerate(sequences) if number in unknown):
         at, at_ns = bisect_left(logged, row), time_ns(row)
         before_ns = time_ns(logged[at - 1]) if at > 0 else at_ns - 1
         is_late = at < len(logged) and at_ns >= time_ns(logged[at])
         if at_ns <= before_ns or is_late or any(before_ns < first[0] <= at_ns for first, _ in spans):
-            found.add(sequences[row])
-    return found
+            impossible.add(sequences[row])
+    return impossible
 
 
 def _span(frames: RecordedFrames, not_logged: set[int], *, goes_on: bool) -> list[tuple[Times, Times]]:
@@ -173,12 +173,12 @@ def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, 
     """Of a run that no log is there of, the numbers of the frames that were captured, by both clocks, while a
     logged run went on: a capture has one run at a time.
     """
-    found = set()
+    impossible = set()
     for row, number in enumerate(frames.sequences.tolist()):
         at_ns, wall_ns = _times(frames, row)
         if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in spans):
-            found.add(number)
-    return found
+            impossible.add(number)
+    return impossible
 
 
 def _compared(
