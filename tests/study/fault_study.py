@@ -113,7 +113,10 @@ def _tell(
 
 def table(results: Results) -> str:
     """By kind, as Markdown."""
-    lines = ["| fault | how often | all works again, at worst, s | violations |", "|---|---|---|---|"]
+    lines = [
+        "| fault | how often | all works again, at worst, s | violations in its rounds |",
+        "|---|---|---|---|",
+    ]
     for name in KINDS:
         worst = f"{results.worst_s[name]:.1f}" if results.times[name] else ""
         lines.append(f"| {name} | {results.times[name]} | {worst} | {results.violated[name]} |")
