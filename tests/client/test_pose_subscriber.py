@@ -146,10 +146,11 @@ def test_without_a_service_the_names_are_a_failure_not_a_guess() -> None:
 def test_damaged_repeated_and_lost_poses_are_counted(service: Service, client: zenoh.Session) -> None:
     with PoseSubscriber(client, "lab", "g1") as poses:
         first_pose(service, poses)
-        repeated = poses.counts.repeated
         message = encode_pose(pose(1))
         for damaged in (b"", message[:-1], message[:50] + b"\xff" + message[51:], message + b"\0"):
             service.session.put(KEYS.pose, damaged)
+        eventually(lambda: poses.counts.damaged == 4, "all of them, after every first pose that was sent")
+        repeated = poses.counts.repeated
         for item in (pose(1), pose(1), pose(0), pose(5, skipped=2), pose(6, skipped=2), pose(0, run_id=2)):
             service.put(item)
         eventually(lambda: poses.counts.runs == 2, "the second run")

@@ -97,7 +97,7 @@ def test_a_recorded_take_becomes_a_model_that_predicts_live(live, recorded):
     assert "no reference angles" in run("train", "-s", "anna", "-t", "first").said
     attached = run("take", "reference", "first", recorded)
     assert attached.code == 0, attached.err
-    assert "; 100 % of its frames" in attached.out
+    assert re.search(r"; (9\d|100) % of its frames", attached.out), "fewer where the computer stood still"
     begun = run("train", "-s", "anna", "--method", "linear", "--folds", 0, "--no-wait", "--json").json
     assert run("job", "wait", begun["id"], "--json").json["state"] == "done"
     assert run("job", "wait", begun["id"]).out == f"Job {begun['id']} is done.\n"
