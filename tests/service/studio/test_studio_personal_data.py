@@ -7,8 +7,11 @@ import zipfile
 from pathlib import Path
 
 import httpx
+import pytest
 from playwright.sync_api import expect
 from studio_support import Open, serious, without_focus
+
+pytestmark = pytest.mark.needs_chromium
 
 
 def test_all_that_is_kept_of_a_person_is_saved_from_the_page(
