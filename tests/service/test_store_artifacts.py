@@ -66,6 +66,9 @@ def test_no_other_name_reaches_a_path(name):
         def exists(self, name: str) -> bool:
             pytest.fail(f"a path was made of {name!r}")
 
+        def remove(self, name: str) -> None:
+            pytest.fail(f"a path was made of {name!r}")
+
         def stamp(self, name: str) -> None:
             pytest.fail(f"a path was made of {name!r}")
 
@@ -73,7 +76,7 @@ def test_no_other_name_reaches_a_path(name):
             pytest.fail(f"a path was made of {name!r}")
 
     artifacts = Artifacts(Untouched())
-    for call in (artifacts.get, artifacts.exists, artifacts.verify):
+    for call in (artifacts.get, artifacts.exists, artifacts.verify, artifacts.remove):
         with pytest.raises(BadInput):
             call(name)
 
