@@ -17,7 +17,7 @@ from glovecal_client.site.member import Member, read_member, site_file
 
 LOOK_EVERY_S = 1.0
 UNANSWERED_LOOKS = 3
-"""In a row, of a router that is there: it does not know this member any more."""
+"""In a row, by a router that is connected: it stands still, or does not know this member any more."""
 _log = logging.getLogger("glovecal.site")
 
 
@@ -61,11 +61,11 @@ class RenewedSession:
             return  # being replaced
         if self._unanswered == UNANSWERED_LOOKS:
             _log.warning(
-                "the service does not let %s do anything at site %s any more: it was revoked. Nothing of it "
-                "arrives; a new file is made at the service by `glovecal site add`", name, site,
+                "the service at site %s answers %s no more: it stands still, or this member was revoked, and "
+                "nothing arrives. Look with `glovecal site list` at the service", site, name,
             )  # fmt: skip
         elif before >= UNANSWERED_LOOKS and not gone and not self._unanswered:
-            _log.warning("the service lets %s in again at site %s", name, site)
+            _log.warning("the service at site %s answers %s again", site, name)
 
     def _look(self, file: Path) -> None:
         """A file that cannot be used is left alone: the certificate in use may be good for long."""

@@ -8,6 +8,7 @@ capture never gave, leave the recording.
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,8 @@ from glovecal_service.recorder.run_ledger import RecordedFrames, RunLedger
 PAUSE_S = 0.005
 """Between two blocks: capture has its glove to read."""
 
-
+ROWS_AT_ONCE = 4096
+"""Read of a recording."""
 ROUNDS = 3
 """What was taken out leaves gaps; what fills them came from the log."""
 
@@ -118,9 +120,10 @@ Times = tuple[int, int]
 NEVER: Times = (1 << 63, 1 << 63)
 
 
-def _times(frames: RecordedFrames, row: int) -> Times:
-    frame = decode_frame(frames.messages(slice(row, row + 1))[0])
-    return frame.monotonic_ns, frame.wall_ns
+def _times(frames: RecordedFrames, rows: slice | Sequence[int]) -> list[Times]:
+    """Raises OSError."""
+    found = map(decode_frame, frames.messages(rows))
+    return [(frame.monotonic_ns, frame.wall_ns) for frame in found]
 
 
 def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
@@ -130,9 +133,9 @@ def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
     reached = file.reached.get(run_id)
     beyond = {sequence for sequence in unknown if reached is not None and sequence > reached}
     for stretch in file.runs[run_id].stretches[1:]:
-        jumped_to = {number for first, last in stretch.recorded for number in range(first, last + 1)}
-        if jumped_to <= unknown:
-            beyond |= jumped_to
+        jumped_to = [number for first, last in stretch.recorded for number in range(first, last + 1)]
+        if all(number in unknown for number in jumped_to):
+            beyond.update(jumped_to)
     return beyond
 
 
@@ -143,19 +146,19 @@ def _out_of_order(
     frames before and after, the first ones of later runs among these: capture numbers its frames as time
     goes, one run after another. That is known of a killed capture too.
     """
-
-    def time_ns(row: int) -> int:
-        return _times(frames, row)[0]
-
     if not unknown:
         return set()
     sequences = frames.sequences.tolist()
     logged = [row for row, number in enumerate(sequences) if number not in unknown and number not in strange]
+    asked = [row for row, number in enumerate(sequences) if number in unknown]
+    places = [bisect_left(logged, row) for row in asked]
+    needed = sorted({*asked, *(row for at in places for row in logged[max(0, at - 1) : at + 1])})
+    time_ns = dict(zip(needed, (at_ns for at_ns, _ in _times(frames, needed)), strict=True))
     impossible = set()
-    for row in (row for row, number in enumerate(sequences) if number in unknown):
-        at, at_ns = bisect_left(logged, row), time_ns(row)
-        before_ns = time_ns(logged[at - 1]) if at > 0 else at_ns - 1
-        is_late = at < len(logged) and at_ns >= time_ns(logged[at])
+    for row, at in zip(asked, places, strict=True):
+        at_ns = time_ns[row]
+        before_ns = time_ns[logged[at - 1]] if at > 0 else at_ns - 1
+        is_late = at < len(logged) and at_ns >= time_ns[logged[at]]
         if at_ns <= before_ns or is_late or any(before_ns < first[0] <= at_ns for first, _ in spans):
             impossible.add(sequences[row])
     return impossible
@@ -166,7 +169,8 @@ def _span(frames: RecordedFrames, not_logged: set[int], *, goes_on: bool) -> lis
     logged = [row for row, number in enumerate(frames.sequences.tolist()) if number not in not_logged]
     if not logged:
         return []
-    return [(_times(frames, logged[0]), NEVER if goes_on else _times(frames, logged[-1]))]
+    first, last = _times(frames, [logged[0], logged[-1]])
+    return [(first, NEVER if goes_on else last)]
 
 
 def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, Times]]) -> set[int]:
@@ -174,10 +178,13 @@ def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, 
     logged run went on: a capture has one run at a time.
     """
     impossible = set()
-    for row, number in enumerate(frames.sequences.tolist()):
-        at_ns, wall_ns = _times(frames, row)
-        if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in spans):
-            impossible.add(number)
+    for begin in range(0, len(frames), ROWS_AT_ONCE):
+        rows = slice(begin, begin + ROWS_AT_ONCE)
+        for number, (at_ns, wall_ns) in zip(
+            frames.sequences[rows].tolist(), _times(frames, rows), strict=True
+        ):
+            if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in spans):
+                impossible.add(number)
     return impossible
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any
@@ -283,7 +283,7 @@ class RecordedFrames:
     def __len__(self) -> int:
         return len(self.sequences)
 
-    def messages(self, rows: slice) -> list[bytes]:
+    def messages(self, rows: slice | Sequence[int]) -> list[bytes]:
         """As they lie in the capture log, if they are from there. Raises OSError."""
         messages = []
         with self._path.open("rb") as file:

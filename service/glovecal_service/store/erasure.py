@@ -28,7 +28,6 @@ from glovecal_service.store.belongings import (
     Belongings,
     artifacts_of,
     films_of,
-    parts_of,
     recording_files,
 )
 from glovecal_service.store.database import grow_revision, new_id, now
@@ -198,10 +197,8 @@ def _require_as_seen(connection: Connection, of: Belongings) -> None:
 
 
 def _remove_rows(connection: Connection, of: Belongings, jobs: Iterable[JobRecord]) -> dict[str, int]:
-    name, models = (
-        of.subject.name,
-        select(tables.models.c.id).where(tables.models.c.subject == of.subject.name),
-    )
+    name = of.subject.name
+    models = select(tables.models.c.id).where(tables.models.c.subject == name)
     children = tables.models.c.parent.in_(models) & (tables.models.c.subject != name)
     change_rows(connection, tables.models, children, {"parent": None})
     removed: Counter[str] = Counter()
@@ -311,10 +308,8 @@ def _sha256(store: Store, settings: Settings, file: dict[str, str]) -> str:
     """ "" for what is not there."""
     if file["place"] == ARTIFACTS:
         return file["name"] if store.artifacts.exists(file["name"]) else ""
-    digest = hashlib.sha256()
-    for part in parts_of(settings.data / file["name"]):
-        digest.update(part)
-    return digest.hexdigest()
+    with (settings.data / file["name"]).open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def _unlink(store: Store, settings: Settings, file: dict[str, str]) -> bool:
