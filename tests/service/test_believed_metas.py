@@ -110,6 +110,7 @@ def test_a_run_keeps_its_sensors_wearer_and_hand(
         assert "Stop the other publisher" in warning["advice"]
         said = ask_json(session, glove.keys.pose_meta)
         assert (said["subject"], said["hand"], said["model"]) == ("anna", "right", model)
+        eventually(lambda: "g-kept" in names(store), "it is stored", WITHIN_S)
         assert store.gloves.get("g-kept").meta["sensors"] == list(LAYOUT.sensors)
     glove.restart()
     glove.say_meta(subject="mallory")

@@ -76,18 +76,19 @@ def test_numbers_far_ahead_are_judged_by_the_clock_of_their_frames(settings: Set
         running.enter_context(recording_thread(settings))
         asked = store.recordings.request(GLOVE, name="stood still", lead_s=0)
         eventually(lambda: store.recordings.get(asked.id).state == "recording", "it is recorded")
-        device.wanted = 200
-        eventually(lambda: recorded(store, asked.id) == 200, "the first frames")
+
+        def heard_more_than(frames: int) -> bool:
+            device.wanted += 10
+            return recorded(store, asked.id) > frames
+
+        eventually(lambda: heard_more_than(200), "the first frames")
+        eventually(lambda: device.given == device.wanted, "no more for now")
         router.close()
+        at_most_heard = device.given
         device.wanted += unheard
         eventually(lambda: device.given == device.wanted, "frames that nobody hears")
         running.enter_context(open_router([settings.zenoh]))
-
-        def more() -> bool:
-            device.wanted += 10
-            return recorded(store, asked.id) > 200
-
-        eventually(more, "the recorder hears the glove again")
+        eventually(lambda: heard_more_than(at_most_heard), "the recorder hears the glove again")
         record = stopped(store, asked.id)
         in_log = [frame.sequence for frame in Recording.open(logged(settings)[-1]).frames()]
     assert (record.state, record.facts["missing"]) == ("done", [])

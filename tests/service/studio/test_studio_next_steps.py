@@ -131,5 +131,6 @@ def test_with_takes_the_next_step_is_training(opened: Open, empty: str, tmp_path
         page = opened(name, at=empty).page
         expect(page.get_by_text("glovecal train --subject dora", exact=True)).to_be_visible()
     page = opened("models", at=empty).page
-    page.get_by_role("link", name="Train a model").click()
+    steps_of_page = page.get_by_role("region", name="What to do next")
+    steps_of_page.get_by_role("link", name="Train a model").click()
     expect(page.get_by_role("button", name="Train on 4 takes")).to_be_visible()
