@@ -26,12 +26,20 @@ from glovecal_service.recorder import reconciliation
 from glovecal_service.recorder.log_comparison import reconcile_and_compare
 from glovecal_service.recorder.reconciliation import CaptureRun, CaptureStanding, Patience
 from glovecal_service.recorder.recording_result import Settlement
-from glovecal_service.recorder.run_ledger import BEGIN, FINDINGS, RunLedger, frames_taken_out, usable_frames
+from glovecal_service.recorder.run_ledger import (
+    BEGIN,
+    CREATED,
+    FINDINGS,
+    RunLedger,
+    frames_taken_out,
+    usable_frames,
+)
 
 MS = 1_000_000
 STRANGE = np.array([-1.0], np.float32)
 CLOCK_AHEAD_NS = 3_600_000 * MS
-"""The capture computer's clock is an hour ahead."""
+"""The capture computer's clock is an hour ahead, until it is set."""
+CLOCK_STEPS_NS = (-7_200_000 * MS, -30 * MS, 30 * MS, 7_200_000 * MS)
 
 
 @dataclass
@@ -43,8 +51,10 @@ class NumberedFrame:
 class Capture:
     """Numbers frames into real logs, as the daemon does; ``now_ns`` is the service's clock."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, tells_monotonic: bool) -> None:
         self.open = ExitStack()
+        self.tells_monotonic = tells_monotonic
+        self.ahead_ns = CLOCK_AHEAD_NS
         self.folder = self.open.enter_context(closing(LogFolder(folder, GloveKeys("lab", "g1"))))
         self.numbered: list[NumberedFrame] = []
         self.now_ns = 1_000_000 * MS
@@ -57,7 +67,8 @@ class Capture:
 
     def restart(self) -> None:
         self.now_ns += 50 * MS
-        self.runs.append(CaptureRun(len(self.runs) + 1, self.now_ns + CLOCK_AHEAD_NS))
+        started_ns = self.now_ns if self.tells_monotonic else None
+        self.runs.append(CaptureRun(len(self.runs) + 1, self.now_ns + self.ahead_ns, started_ns))
         self.log = self.open.enter_context(closing(self.folder.create(self.runs[-1].run_id, {})))
         self.queries = LogQueries(self.folder)
         self.sequence = -1
@@ -66,7 +77,7 @@ class Capture:
     def frame(self, logged: bool, step_ns: int = 8 * MS) -> Frame:
         self.now_ns += step_ns
         self.sequence += 1
-        wall_ns = self.now_ns + CLOCK_AHEAD_NS
+        wall_ns = self.now_ns + self.ahead_ns
         readings = np.array([self.sequence], np.float32)
         frame = Frame(self.sequence, self.runs[-1].run_id, self.now_ns, wall_ns, readings)
         self.numbered.append(NumberedFrame(frame, logged=False))
@@ -84,7 +95,8 @@ class Capture:
 
     def standing(self) -> CaptureStanding:
         self._check()
-        return CaptureStanding(tuple(self.runs), self.sequence, self.disk_full, CLOCK_AHEAD_NS)
+        now = (self.now_ns, self.now_ns)
+        return CaptureStanding(tuple(self.runs), self.sequence, self.disk_full, self.ahead_ns, *now)
 
     def block(self, run_id: int, first: int, last: int) -> list[Frame]:
         self._check()
@@ -120,6 +132,7 @@ STEPS = st.lists(
         st.tuples(st.just("restarted"), st.integers(0, 2)),
         st.tuples(st.just("unreachable"), st.just(0)),
         st.tuples(st.just("disk full, or room again"), st.just(0)),
+        st.tuples(st.just("clock set"), st.integers(0, len(CLOCK_STEPS_NS) - 1)),
         st.tuples(st.just("forged"), st.integers(0, 3 * len(FORGED_NUMBERS) - 1)),
     ),
     min_size=1,
@@ -130,14 +143,16 @@ STEPS = st.lists(
 class Story:
     """A recording from its begin on."""
 
-    def __init__(self, folder: Path) -> None:
-        self.capture = Capture(folder)
+    def __init__(self, folder: Path, tells_monotonic: bool) -> None:
+        self.capture = Capture(folder, tells_monotonic)
         for _ in range(3):
             self.capture.frame(True)
         self.path = folder / "recording.glog"
         wall_ns = self.capture.numbered[-1].frame.wall_ns
         begin = {"run_id": f"{1:016x}", "sequence": self.capture.sequence, "wall_ns": wall_ns}
-        self.file = self.opened(RunLedger.create(self.path, {BEGIN: begin}))
+        begin["clock_ahead_ns"] = CLOCK_AHEAD_NS
+        meta = {BEGIN: begin, CREATED: self.capture.now_ns}
+        self.file = self.opened(RunLedger.create(self.path, meta))
         self.begin = len(self.capture.numbered)
         self.findings: dict[str, dict] = {}
         """What a recording's row has of it."""
@@ -152,6 +167,9 @@ class Story:
             return
         elif what == "disk full, or room again":
             self.capture.make_room(self.capture.disk_full)
+            return
+        elif what == "clock set":
+            self.capture.ahead_ns += CLOCK_STEPS_NS[count] if self.capture.tells_monotonic else 0
             return
         elif what == "jumped":
             self.capture.sequence += count
@@ -230,30 +248,49 @@ def check(story: Story, settlement: Settlement, stop_ns: int) -> None:
             continue
         if item.logged:
             assert key not in lacking, "nothing that is logged is missing"
-            is_due = item.frame.wall_ns <= stop_ns + CLOCK_AHEAD_NS
+            is_due = item.frame.monotonic_ns <= stop_ns
             assert not is_due or key in recorded, "what was logged up to the stop is recorded"
         elif key[1] <= last.get(run_id, -1):
             assert key in recorded | lacking, "a number that was given is told of"
 
 
 @settings(max_examples=150)
-@example(before=[("received", 3), ("lost in no time", 1500), ("received", 2)], after=[("received", 1)])
+@example(
+    before=[("received", 3), ("lost in no time", 1500), ("received", 2)],
+    after=[("received", 1)],
+    tells_monotonic=True,
+)
 @example(
     before=[("unreachable", 0), ("received", 3), ("jumped", 5000), ("lost", 2), ("received", 2)],
     after=[("received", 1)],
+    tells_monotonic=True,
 )
-@example(before=[("forged", 2), ("received, not logged", 2), ("lost", 1)], after=[("unreachable", 0)])
-@example(before=[("received", 1)], after=[("forged", 16)])
-@example(before=[("disk full, or room again", 0), ("lost", 2), ("received", 2)], after=[("received", 1)])
-@example(before=[("disk full, or room again", 0), ("received", 2)], after=[("received", 1)])
-@example(before=[("restarted", 2), ("restarted", 0), ("received", 1)], after=[("received", 1)])
-@given(before=STEPS, after=STEPS)
+@example(
+    before=[("forged", 2), ("received, not logged", 2), ("lost", 1)],
+    after=[("unreachable", 0)],
+    tells_monotonic=True,
+)
+@example(before=[("received", 1)], after=[("forged", 16)], tells_monotonic=True)
+@example(
+    before=[("disk full, or room again", 0), ("lost", 2), ("received", 2)],
+    after=[("received", 1)],
+    tells_monotonic=True,
+)
+@example(
+    before=[("disk full, or room again", 0), ("received", 2)], after=[("received", 1)], tells_monotonic=True
+)
+@example(
+    before=[("restarted", 2), ("restarted", 0), ("received", 1)],
+    after=[("received", 1)],
+    tells_monotonic=True,
+)
+@given(before=STEPS, after=STEPS, tells_monotonic=st.booleans())
 def test_every_frame_up_to_the_stop_is_recorded_or_missing(
-    before: list[tuple[str, int]], after: list[tuple[str, int]]
+    before: list[tuple[str, int]], after: list[tuple[str, int]], tells_monotonic: bool
 ) -> None:
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr(reconciliation, "UNANSWERED_FOR_S", -1.0)
-        story = Story(Path(folder))
+        story = Story(Path(folder), tells_monotonic)
         with story.capture.open:
             for what, count in before:
                 story.tell(what, count)
@@ -285,7 +322,7 @@ def test_every_frame_up_to_the_stop_is_recorded_or_missing(
 def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() -> None:
     """Nobody says any more how far it came: a stranger's number far ahead is told by its time."""
     with tempfile.TemporaryDirectory() as folder:
-        story = Story(Path(folder))
+        story = Story(Path(folder), tells_monotonic=True)
         with story.capture.open:
             for step in [("received", 2), ("forged", 2), ("received", 3), ("restarted", 0), ("received", 1)]:
                 story.tell(*step)
@@ -301,7 +338,7 @@ def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() 
 def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(later: int) -> None:
     """``later``: frames of the capture's own that were recorded after it."""
     with tempfile.TemporaryDirectory() as folder:
-        story = Story(Path(folder))
+        story = Story(Path(folder), tells_monotonic=True)
         with story.capture.open:
             story.tell("received", 2)
             last = story.capture.numbered[-1].frame
@@ -325,7 +362,7 @@ def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(lat
 def test_a_number_that_a_killed_capture_never_gave_moves_no_later_run_in_time() -> None:
     """The run after it begins, by the computer's clock, before the frame was captured."""
     with tempfile.TemporaryDirectory() as folder:
-        story = Story(Path(folder))
+        story = Story(Path(folder), tells_monotonic=True)
         with story.capture.open:
             story.tell("received", 2)
             last = story.capture.numbered[-1].frame

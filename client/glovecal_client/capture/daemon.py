@@ -228,7 +228,7 @@ class CaptureDaemon:
         self._settings = settings
         self._report = report
         self._run_id = secrets.randbits(64)
-        self._status = CaptureStatus(self._run_id, wall_ns())
+        self._status = CaptureStatus(self._run_id, wall_ns(), clock_ns())
         self._check = ReadingCheck(device)
         self._refusal: str | None = None
         self._tell_damaged_at = 1
@@ -384,6 +384,7 @@ class CaptureDaemon:
             "run_id": f"{self._run_id:016x}",
             "device": device.name,
             "started_wall_ns": self._status.started_wall_ns,
+            "started_ns": self._status.started_ns,
             "software": f"glovecal-client {metadata.version('glovecal-client')}",
         }
 

@@ -102,12 +102,16 @@ class LogFolder:
             ) from error
 
     def runs(self) -> list[dict[str, Any]]:
-        """``run_id`` and ``started_wall_ns`` of the newest logs, oldest first; damaged ones are left out."""
+        """``run_id`` and ``started_wall_ns`` of the newest logs, oldest first; damaged ones are left out.
+
+        And ``started_ns`` and ``computer``, whose monotonic clock that is by, where a log says so.
+        """
         found = []
         for path in sorted(self.path.glob(f"*{SUFFIX}"), key=lambda log: log.name)[-EARLIER_RUNS:]:
             with suppress(DamagedLog, OSError, KeyError):
                 meta = Recording.open(path).meta
-                found.append({name: meta[name] for name in ("run_id", "started_wall_ns")})
+                run = {name: meta[name] for name in ("run_id", "started_wall_ns")}
+                found.append(run | {name: meta[name] for name in ("started_ns", "computer") if name in meta})
         return sorted(found, key=lambda run: run["started_wall_ns"])
 
     def find(self, run_id: int) -> Path | None:

@@ -20,6 +20,8 @@ class CaptureStatus:
 
     run_id: int
     started_wall_ns: int
+    started_ns: int
+    """By the monotonic clock."""
     state: CaptureState = "opening"
     sentence: str = "opening the device"
     frames: int = 0
@@ -74,7 +76,9 @@ class CaptureStatus:
                 "run_id": f"{self.run_id:016x}",
                 "own_clock": self.own_clock,
                 "started_wall_ns": self.started_wall_ns,
+                "started_ns": self.started_ns,
                 "wall_ns": wall_ns(),
+                "monotonic_ns": now_ns,
             }
 
     def _silence(self, age_s: float | None) -> str | None:

@@ -77,7 +77,7 @@ class CameraTracking:
         self.health = CameraHealth()
         self._settings, self._report = settings, report
         self._run_id = secrets.randbits(64)
-        self._status = CaptureStatus(self._run_id, wall_ns())
+        self._status = CaptureStatus(self._run_id, wall_ns(), clock_ns())
         self._newest = NewestPicture()
         self._kept = KeptPictures(settings.keep, settings.folder / "kept", settings.glove)
         self._stop = threading.Event()

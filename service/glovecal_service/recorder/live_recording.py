@@ -60,8 +60,8 @@ class LiveRecording:
         self._repair_at = 0.0
         self._met = False
         """Whether a frame has come."""
-        self._end_ns: int | None = None
-        """Once its end was asked for: by capture's clock, as far as that is known."""
+        self._is_after_the_end: Callable[[Frame], bool] = lambda _: False
+        """Once its end was asked for, and as far as capture's clock is known."""
         self._log = CaptureLog(session, keys)
         self._arrivals = Arrivals(session, keys.raw, limit=WAITING_LIMIT)
         self._statuses = Arrivals(session, keys.status, limit=STATUSES_LIMIT)
@@ -129,7 +129,7 @@ class LiveRecording:
         if frame is None:
             self.refused += 1
             return
-        if self._end_ns is not None and frame.wall_ns > self._end_ns:
+        if self._is_after_the_end(frame):
             return
         silent = received_ns - self._heard_ns > TAKEOVER_AFTER_NS
         if frame.run_id != self._run_id and self._run_id is not None and not silent:
@@ -197,12 +197,10 @@ class LiveRecording:
     def finish(self, stop_wall_ns: int | None, patience: Patience) -> Settlement:
         """Stop: fetch or wait for everything captured up to the stop, close the file; as in ``reconcile``."""
         patience.wait(ON_THE_WAY_S)
-        ahead_ns = self.file.clock_ahead_ns
-        if ahead_ns is None:  # capture did not answer when the recording began
+        if stop_wall_ns is not None:
             with suppress(NoAnswer):
-                ahead_ns = self._log.standing().clock_ahead_ns
-        if stop_wall_ns is not None and ahead_ns is not None:
-            self._end_ns = stop_wall_ns + ahead_ns
+                standing = self._log.standing()
+                self._is_after_the_end = lambda frame: standing.frame_ns(frame) > stop_wall_ns
         self._stop_listening()
         outcome = reconcile_and_compare(self.file, self._log, stop_wall_ns, patience)
         self._finish_pre_roll(patience)

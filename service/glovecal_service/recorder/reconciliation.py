@@ -1,13 +1,16 @@
 """Bringing a recording to agree with the capture log: what is not in it is fetched, or missing for good.
 
 The glove's capture daemon answers where it stands, and with the frames in its logs. A recording ends when
-somebody asked for its end, whether the recorder was running then or not. So its end is a time; the capture
-log, which has every frame with its time, tells which frame was the last one.
+somebody asked for its end, whether the recorder was running then or not. So its end is a time, by this
+computer's clock; the capture log, which has every frame with its time, tells which frame was the last one.
+The capture computer's clock may be set meanwhile: so a frame's time is how long before now it was captured,
+by the monotonic clock of its computer.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from threading import Event
 from typing import Any, Protocol
@@ -33,6 +36,9 @@ class CaptureRun:
     run_id: int
     started_wall_ns: int
     """By the capture computer's clock."""
+    started_ns: int | None = None
+    """By its monotonic clock; None for a run of before the computer was started anew, and where capture does
+    not say so."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +53,23 @@ class CaptureStanding:
     """Numbered frames may be waiting in the daemon's memory for room in its log."""
     clock_ahead_ns: int
     """By how much the capture computer's wall clock is ahead of this one's, at most."""
+    at_monotonic_ns: int = 0
+    at_wall_ns: int = 0
+    """When it said so, by its monotonic clock and by this computer's clock."""
     meta: dict[str, Any] = field(default_factory=dict)
     """What it says of itself and its glove."""
+
+    def time_ns(self, run_id: int, monotonic_ns: int, wall_ns: int) -> int:
+        """By this computer's clock as it goes now: the time of what a run did at a time by its two clocks."""
+        if any(run.run_id == run_id and run.started_ns is not None for run in self.runs):
+            return self.at_wall_ns + monotonic_ns - self.at_monotonic_ns
+        return wall_ns - self.clock_ahead_ns
+
+    def frame_ns(self, frame: Frame) -> int:
+        return self.time_ns(frame.run_id, frame.monotonic_ns, frame.wall_ns)
+
+    def start_ns(self, run: CaptureRun) -> int:
+        return self.time_ns(run.run_id, run.started_ns or 0, run.started_wall_ns)
 
 
 class CaptureLog:
@@ -64,14 +85,16 @@ class CaptureLog:
         asked_ns = wall_ns()
         status = ask_json(self._session, self._keys.status, timeout_s=ANSWER_WITHIN_S)
         try:
-            runs = [*meta.get("earlier_runs", ()), status]
+            mine = {**status, "computer": meta.get("computer")}
             last = status["sequence"]
             return CaptureStanding(
-                tuple(CaptureRun(int(run["run_id"], 16), int(run["started_wall_ns"])) for run in runs),
+                tuple(_run(each, mine) for each in (*meta.get("earlier_runs", ()), mine)),
                 -1 if last is None else int(last),
                 status.get("disk") == "full",
                 # a capture of before this field was there is taken to have this computer's clock
                 int(status.get("wall_ns", asked_ns)) - asked_ns,
+                int(status.get("monotonic_ns", 0)),
+                asked_ns,
                 meta,
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -90,6 +113,13 @@ class CaptureLog:
         Raises as ``block``; QueryRefused also by a capture that gives no digests.
         """
         return fetch_digest(self._session, self._keys, run_id, first, last, timeout_s=ANSWER_WITHIN_S)
+
+
+def _run(run: Mapping[str, Any], now: Mapping[str, Any]) -> CaptureRun:
+    """Raises KeyError, TypeError, ValueError."""
+    same_clock = run.get("computer") == now["computer"] and "monotonic_ns" in now and "started_ns" in run
+    started_ns = int(run["started_ns"]) if same_clock else None
+    return CaptureRun(int(run["run_id"], 16), int(run["started_wall_ns"]), started_ns)
 
 
 END_OF_RUN = (1 << 63) - 1
@@ -175,17 +205,16 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
         if (stop_wall_ns is None or file.has_ended) and not file.has_gaps:
             return
         raise
-    end_ns = None if stop_wall_ns is None else stop_wall_ns + standing.clock_ahead_ns
-    if end_ns is not None:
-        _open_runs_of(file, standing, end_ns)
+    if stop_wall_ns is not None:
+        _open_runs_of(file, standing, stop_wall_ns)
     file.note_capture(standing.meta)
     file.note_reached(standing.runs[-1].run_id, standing.sequence)
     refused = None
     for books in list(file.runs.values()):
         try:
             fill_gaps(file, books, log, patience)
-            if end_ns is not None and not books.ended:
-                _go_on_to(end_ns, file, books, log, standing, patience)
+            if stop_wall_ns is not None and not books.ended:
+                _go_on_to(stop_wall_ns, file, books, log, standing, patience)
         except QueryRefused as error:
             refused = error
     if standing.disk_full and file.has_gaps:
@@ -194,13 +223,13 @@ def _reconcile_once(file: RunLedger, log: Log, stop_wall_ns: int | None, patienc
         raise refused
 
 
-def _open_runs_of(file: RunLedger, standing: CaptureStanding, end_ns: int) -> None:
+def _open_runs_of(file: RunLedger, standing: CaptureStanding, stop_wall_ns: int) -> None:
     """The runs that began during the recording, whether a frame of them came or not: all of each."""
-    began_ns = file.began_wall_ns
-    if began_ns is None:
-        began_ns = file.created_wall_ns + standing.clock_ahead_ns
+    began_ns = file.created_wall_ns
+    if file.clock_ahead_ns is None and file.first_frame is not None:  # it began with that one
+        began_ns = standing.frame_ns(file.first_frame)
     for run in standing.runs:
-        if began_ns < run.started_wall_ns <= end_ns:
+        if began_ns < standing.start_ns(run) <= stop_wall_ns:
             file.open_run(run.run_id, run.started_wall_ns)
 
 
@@ -225,25 +254,26 @@ def _fetch(file: RunLedger, books: RunBooks, log: Log, patience: Patience, first
 
 
 def _go_on_to(
-    end_ns: int,
+    stop_wall_ns: int,
     file: RunLedger,
     books: RunBooks,
     log: Log,
     standing: CaptureStanding,
     patience: Patience,
 ) -> None:
-    """Fetch what was captured after the last frame known and before the end, capture's clock.
+    """Fetch what was captured after the last frame known and before the end.
 
     The log tells where that is: the clock of a frame that came over the wire may be anybody's.
     """
     at = max(books.first, books.last + 1)
     while block := _block(log, books, at, END_OF_RUN, patience):
         for frame in block:
-            if frame.wall_ns > end_ns:
+            if standing.frame_ns(frame) > stop_wall_ns:
                 return
             file.add(frame, encode_frame(frame))
         at = block[-1].sequence + 1
-    if books.last_wall_ns > end_ns:
+    newest = books.newest
+    if newest.recorded and standing.time_ns(books.run_id, newest.last_ns, books.last_wall_ns) > stop_wall_ns:
         return
     if books.run_id == standing.runs[-1].run_id and standing.sequence > books.last:
         if standing.disk_full:
