@@ -34,13 +34,13 @@ from glovecal_client.program import (
     guard_streams,
     handle_signals,
     leave_signals_to_the_parent,
-    never_wait,
     say,
 )
 from glovecal_client.session import encrypted
 from glovecal_client.site.certificates import check_certificate
 from glovecal_client.site.member import read_member
-from glovecal_models.errors import GlovecalError
+from glovecal_models.errors import BadInput, GlovecalError
+from glovecal_service.logs import Word, log_to_stderr
 from glovecal_service.operating_system import FORKS, children_context
 from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.request_guard import asks_who
@@ -136,7 +136,6 @@ class Part:
 
 def serve(settings: Settings) -> int:
     """Run until asked to stop, as by Ctrl-C; the exit code. What no restart cures is told in one sentence."""
-    _log_to_stderr()
     parts = [
         Part("real time", real_time, ("zenoh", *_zenoh_address(settings))),
         Part("recorder", recorder),
@@ -144,9 +143,12 @@ def serve(settings: Settings) -> int:
     ]
     try:
         with DataFolderLock(settings.data) as lock:
+            log_to_stderr(settings)
             return _serve(settings, parts, lock)
     except FolderInUse as error:
         problem = _ports_problem(parts) or str(error)
+    except BadInput as error:
+        problem = str(error)
     print(f"glovecal serve: {problem}", file=sys.stderr)
     return 1
 
@@ -183,7 +185,7 @@ def _supervise(parts: list[Part], settings: Settings, lifeline: Lifeline, stoppe
             said = True
             say(_banner(settings))
             if waiting:
-                _log.warning("not ready yet: %s", ", ".join(waiting))
+                _log.warning("not ready yet: %s", Word(", ".join(waiting)))
 
 
 def _why_not(settings: Settings, parts: list[Part]) -> str:
@@ -323,7 +325,7 @@ def _keep_alive(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     ending = f"exit code {code}: {why}" if why else f"exit code {code}"
     if part.work is real_time:
         Restarts(settings.data).note()
-    _log.warning("%s ended (%s); starting it again in %.2g s", part.name, ending, delay_s)
+    _log.warning("%s ended (%s); starting it again in %.2g s", Word(part.name), Word(ending), delay_s)
 
 
 def _delay_s(part: Part, code: int | None, lived_s: float) -> float:
@@ -347,7 +349,7 @@ def _stop(parts: list[Part], lifeline: Lifeline) -> None:
     for process in running:
         process.join(max(0.1, deadline - time.monotonic()))
         if process.is_alive():
-            _log.warning("%s does not stop; killing it", process.name)
+            _log.warning("%s does not stop; killing it", Word(process.name))
             process.kill()
             process.join()
 
@@ -355,7 +357,7 @@ def _stop(parts: list[Part], lifeline: Lifeline) -> None:
 def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
     """What a child does first: see to it that it stops when asked, and when the parent is gone."""
     guard_streams()
-    settle = _log_to_stderr()
+    settle = log_to_stderr(settings)
     keep_private()
     stopped = Event()
     leave_signals_to_the_parent()
@@ -364,7 +366,7 @@ def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> 
     try:
         work(settings, stopped, ready.set)
     except Exception as error:
-        _log.error("%s: %s", multiprocessing.current_process().name, error)
+        _log.error("%s: %s", Word(multiprocessing.current_process().name), error)
         sys.exit(1)
     finally:
         settle()
@@ -416,17 +418,3 @@ def _follow_server(server: Any, stopped: Event, started: Callable[[], None]) -> 
     started()
     stopped.wait()
     server.should_exit = True
-
-
-def _log_to_stderr() -> Callable[[], None]:
-    """Returns what waits until all is written. A process that was forked has its parent's handler."""
-    settle = never_wait()
-    logging.basicConfig(
-        stream=sys.stderr,
-        level=logging.INFO,
-        format="%(asctime)s %(name)s %(levelname)s %(message)s",
-        force=True,
-    )
-    for chatty in ("alembic", "uvicorn.error", "httpx"):
-        logging.getLogger(chatty).setLevel(logging.WARNING)
-    return settle

@@ -54,6 +54,8 @@ class Settings(BaseSettings):
     scheduler: str | None = None
     """Address ``tls://HOST:PORT`` of a Dask scheduler whose workers share ``data``; None: workers of our own,
     started when they are needed."""
+    log_names: bool = True
+    """Whether lines of the log may name people, gloves and takes."""
     studio: bool = True
     """Serve the pages below ``/studio``."""
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from glovecal_client.errors import WireError
 from glovecal_client.plausible_loss import PlausibleLoss
 from glovecal_client.wire.frame import Frame, decode_frame
+from glovecal_service.logs import Word
 
 LOG_EVERY_S = 10.0
 
@@ -70,7 +71,7 @@ class RefusalCount:
             self.last_sentence = str(refused)
             _log.warning(
                 "glove %s: frame refused (%s, %d so far): %s",
-                self._glove, reason.value, self._counts[reason], refused,
+                self._glove, Word(reason.value), self._counts[reason], refused,
             )  # fmt: skip
 
     @property

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
-import traceback
 from collections.abc import Mapping
-
-import structlog
 
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
@@ -19,7 +17,7 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord
 
-log = structlog.get_logger(__name__)
+_log = logging.getLogger("glovecal.jobs")
 
 POLL_S = 0.2
 JOBS_AT_ONCE = 2
@@ -95,10 +93,10 @@ class Dispatcher:
                         break
                     self._begin(job)
             except GlovecalError as error:
-                log.warning("no job can be claimed now", reason=str(error))
+                _log.warning("no job can be claimed now: %s", error)
                 self._stopping.wait(1.0)
             except Exception:
-                log.error("no job can be claimed now", trace=traceback.format_exc())
+                _log.exception("no job can be claimed now")
                 self._stopping.wait(1.0)
 
     def _end_idle_workers(self) -> None:

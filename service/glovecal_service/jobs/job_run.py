@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import structlog
 
 from glovecal_client.operating_system import remove
 from glovecal_models.errors import Cancelled, GlovecalError
@@ -19,6 +18,7 @@ from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
 from glovecal_service.jobs.task_run import TaskOutcome, run_task
 from glovecal_service.jobs.time_left import TimeLeft
 from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
+from glovecal_service.logs import Word
 from glovecal_service.operating_system import step_back_in_this_thread
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
@@ -27,7 +27,7 @@ from glovecal_service.store.records import JobRecord
 if TYPE_CHECKING:
     from distributed import Future
 
-log = structlog.get_logger(__name__)
+_log = logging.getLogger("glovecal.jobs")
 
 WATCH_S = 0.2
 HEARTBEAT_S = 5.0
@@ -81,9 +81,9 @@ class JobRun:
         try:
             self._written(self._end())
         except Conflict as error:
-            log.warning("job was taken over", job=self._job.id, reason=str(error))
+            _log.warning("job %s was taken over: %s", self._job.id, error)
         except GlovecalError as error:
-            log.error("job could not be ended", job=self._job.id, reason=str(error))
+            _log.error("job %s could not be ended: %s", self._job.id, error)
         finally:
             self._ended.set()
             watch.join()
@@ -110,7 +110,7 @@ class JobRun:
             message = str(error)
         except Exception as error:
             trace = traceback.format_exc()
-            log.error("job failed", job=id, kind=self._job.kind, trace=trace)
+            _log.exception("job %s (%s) failed", id, Word(self._job.kind))
             message = f"an error in Glovecal itself ({type(error).__name__}): the job's traceback tells where"
         return lambda: jobs.fail(id, attempt, message, trace)
 
@@ -167,7 +167,7 @@ class JobRun:
                 restarts = 1 if len(results) > known else restarts + 1
                 if restarts > WORKER_RESTARTS:
                     raise
-                log.warning("training processes lost, starting again", job=self._job.id, reason=str(error))
+                _log.warning("job %s: training processes lost, starting again: %s", self._job.id, error)
                 self._workers.reset(error.client)
 
     def _hand_out(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
@@ -285,7 +285,7 @@ class JobRun:
                 if self._store.jobs.get(self._job.id).cancel_requested:
                     self._cancel()
             except StoreUnavailable as error:
-                log.warning("job cannot be watched now", job=self._job.id, reason=str(error))
+                _log.warning("job %s cannot be watched now: %s", self._job.id, error)
             except GlovecalError:
                 self._cancel()  # the attempt is over: somebody else runs the job
 

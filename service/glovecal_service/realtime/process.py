@@ -16,6 +16,7 @@ from glovecal_client.publishers import Publishers
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.incoming.arrivals import Arrivals
+from glovecal_service.logs import Word
 from glovecal_service.operating_system import go_first
 from glovecal_service.plain import reason_of
 from glovecal_service.realtime.lane_effects import WornGloves
@@ -117,7 +118,7 @@ def _thread(name: str, work: Callable[[Event], None], stopped: Event, failures: 
             work(stopped)
         except Exception as error:
             if not stopped.is_set():
-                _log.exception("the thread %s died", name)
+                _log.exception("the thread %s died", Word(name))
                 failures.append(f"the thread {name} died: {reason_of(error)}")
         finally:
             stopped.set()

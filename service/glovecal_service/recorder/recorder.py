@@ -23,6 +23,7 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.session import ask_json, open_client
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.logs import Word
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.live_recording import LiveRecording
 from glovecal_service.recorder.log_comparison import reconcile_and_compare
@@ -199,9 +200,8 @@ class Recorder:
         facts = {}
         if interrupted:
             facts["interruptions"] = [*record.facts.get("interruptions", []), _interruption(live.file)]
-        _log.info(
-            "recording %s of glove %s %s", record.name, record.glove, "resumed" if interrupted else "began"
-        )
+        what = Word("resumed" if interrupted else "began")
+        _log.info("recording %s of glove %s %s", record.name, record.glove, what)
         store.recordings.update(record.id, state="recording", sentence="recording", **facts)
 
     def _keys(self, record: RecordingRecord) -> GloveKeys:

@@ -19,6 +19,7 @@ from glovecal_service.camera.started_cameras import CameraAccess
 from glovecal_service.filming import Filming
 from glovecal_service.first_run.simulated_glove import StreamedGlove
 from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.logs import Word
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.rest import asking
 from glovecal_service.rest.access import audit, keys, login
@@ -207,7 +208,7 @@ async def _sweep_hourly(store: Store, settings: Settings) -> None:
     await asyncio.sleep(FIRST_SWEEP_AFTER_S)
     while True:
         if swept := await run_in_threadpool(sweep, store, settings):
-            _log.info("removed after %g days: %s", settings.keep_days, swept)
+            _log.info("removed after %g days: %s", settings.keep_days, Word(str(swept)))
         with suppress(StoreError):  # another time
             await run_in_threadpool(finish_erasures, store, settings)
         await asyncio.sleep(SWEEP_EVERY_S)

@@ -36,6 +36,7 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
+from glovecal_service.logs import Word
 from glovecal_service.store import tables
 from glovecal_service.store.actor import OPTION, Actor
 from glovecal_service.store.audit_trail import watch_changes, written_down
@@ -218,7 +219,7 @@ def _begin_sqlite(connection: Connection) -> None:
 def _meaning(error: DatabaseError, database: Database) -> Exception:
     """The store's error; the driver's own text goes to the log only."""
     name, code = database.name, _code(error)
-    log.info("database %s refused (%s): %s", name, code, str(error.orig).strip())
+    log.info("database %s refused (%s): %s", name, Word(code), str(error.orig).strip())
     if code in _FULL or (code.startswith("SQLITE_IOERR") and _disk_is_full(database)):
         return StorageFull(f"no room left for the database {name}; nothing was changed: free some disk space")
     if isinstance(error, DataError):

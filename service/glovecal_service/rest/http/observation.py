@@ -8,12 +8,11 @@ import logging
 import re
 import secrets
 import time
-from typing import Any
 
-import structlog
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from glovecal_service.logs import Event
 from glovecal_service.plain import plain_text
 from glovecal_service.rest.http.problem import Problem
 
@@ -69,18 +68,7 @@ fills no log."""
 OFTEN = (f"{PREFIX}/cameras/{{glove}}/picture", f"{PREFIX}/recordings")
 """Routes asked for ten times a second: by each page that shows a camera's picture, and by
 ``glovecal trigger`` that waits for recordings to begin."""
-log: Any = structlog.wrap_logger(
-    logging.getLogger("glovecal.rest"),
-    processors=[
-        structlog.stdlib.filter_by_level,
-        structlog.processors.add_log_level,
-        structlog.processors.TimeStamper(fmt="iso", utc=True),
-        structlog.processors.format_exc_info,
-        structlog.processors.JSONRenderer(),
-    ],
-    wrapper_class=structlog.stdlib.BoundLogger,
-)
-"""Goes through the standard library's logging, so that whoever starts the process decides where to."""
+_log = logging.getLogger("glovecal.rest")
 
 
 class Observation:
@@ -101,7 +89,7 @@ class Observation:
         try:
             await self.app(scope, receive, answer.send)
         except Exception:
-            log.exception("request failed", request_id=request_id, route=_route(scope))
+            _log.exception("%s", Event("request failed", {}, request_id=request_id, route=_route(scope)))
             await _answer_failure(answer, scope, receive, request_id)
         finally:
             self._note(scope, answer, request_id, time.perf_counter() - began)
@@ -111,16 +99,17 @@ class Observation:
         self.metrics.answered(scope["method"], route, answer.status, seconds)
         for_a_page = (scope.get("client") or ("",))[0] == STUDIO or scope["path"].startswith(f"/{STUDIO}/")
         only_looks = (for_a_page or route in OFTEN) and scope["method"] == "GET" and answer.status < 400
-        (log.debug if only_looks else log.info)(
+        request = Event(
             "request",
+            {"path": plain_text(scope["path"], 200)},
             request_id=request_id,
             method=plain_text(scope["method"], 20),
-            path=plain_text(scope["path"], 200),
             route=route,
             status=answer.status,
             ms=round(1e3 * seconds, 2),
             sent_bytes=answer.sent_bytes,
         )
+        _log.log(logging.DEBUG if only_looks else logging.INFO, "%s", request)
 
 
 class _Answer:
