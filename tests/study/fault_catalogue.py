@@ -139,12 +139,13 @@ CATALOGUE = (
             SERVICE + "test_store_killed.py::test_a_killed_service_repeats_only_the_fits_in_flight",
             SERVICE + "test_store_killed.py::test_no_acknowledged_write_is_lost",
         ),
-        "200 kills in one run; a run of the tests has 5 for each database",
+        "200 kills of a training; of writers `python3 do.py test -m slow tests/service/test_store_killed.py` "
+        "has 200 for each database, the suite 5",
     ),
     CatalogueFault(
         12, "kill -9 during an activation", "the old model or the new, never neither; 200 kills",
         (SERVICE + "test_store_killed.py::test_no_acknowledged_write_is_lost",),
-        "200 kills in one run, and one at every step of an activation",
+        "a kill at every step of an activation: they come at random moments",
     ),
     CatalogueFault(
         13, "kill -9 during an upload or a recording",
