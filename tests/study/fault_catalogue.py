@@ -121,9 +121,11 @@ CATALOGUE = (
         (
             CLIENT + "capture_daemon.py::test_recording_starts_without_a_router_and_publishing_when_it_comes",
             SERVICE + "test_realtime_service.py::test_a_silent_glove_is_marked_stale_about_once_a_second",
+            SERVICE + "site/test_site_of_computers.py"
+            "::test_a_site_is_set_up_by_its_page_and_survives_a_cut",
             *_drawn("link cut", "link standing still"),
         ),
-        "cuts longer than 8 s",
+        "cuts longer than 9 s",
     ),
     CatalogueFault(
         10, "subscriber slow or stopped",
