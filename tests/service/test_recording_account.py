@@ -334,13 +334,19 @@ def test_a_killed_capture_gave_no_number_that_its_own_later_frames_contradict() 
     assert account["recorded"] == 6
 
 
+@pytest.mark.parametrize("clock_set", [(), (0,), (3,), (0, 3)])
 @pytest.mark.parametrize("later", [0, 3])
-def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(later: int) -> None:
-    """``later``: frames of the capture's own that were recorded after it."""
+def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(
+    later: int, clock_set: tuple[int, ...]
+) -> None:
+    """``later``: frames of the capture's own that were recorded after it; ``clock_set`` before it."""
     with tempfile.TemporaryDirectory() as folder:
         story = Story(Path(folder), tells_monotonic=True)
         with story.capture.open:
             story.tell("received", 2)
+            for step in clock_set:
+                story.tell("clock set", step)
+                story.tell("received", 2)
             last = story.capture.numbered[-1].frame
             forged = replace(
                 last,
@@ -355,7 +361,8 @@ def test_a_run_that_no_capture_had_is_told_by_the_run_that_went_on_meanwhile(lat
             settlement = story.settle(story.capture.now_ns)
             check(story, settlement, story.capture.now_ns)
     account = settlement.account
-    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, 2 + later)
+    frames = 2 + 2 * len(clock_set) + later
+    assert (account["compared"], account["taken_out"], account["recorded"]) == (True, 1, frames)
     assert settlement.outcome.why == ""
 
 

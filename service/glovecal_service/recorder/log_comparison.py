@@ -8,7 +8,7 @@ capture never gave, leave the recording.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,21 +92,26 @@ def compare(file: RunLedger, log: Log, standing: CaptureStanding, time_left: Pat
             refused, unheard[run_id] = error, frames
             continue
         compared[run_id] = frames, strange, unknown
-    spans = [
-        span
-        for run_id, (frames, strange, unknown) in compared.items()
-        for span in _span(frames, unknown | strange, goes_on=run_id == standing.runs[-1].run_id)
+    began_ns = [
+        at_ns
+        for frames, strange, unknown in compared.values()
+        for at_ns in _first_logged_ns(frames, unknown | strange)
     ]
     out: dict[int, set[int]] = {}
     not_logged = 0
     for run_id, (frames, strange, unknown) in compared.items():
-        never = _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange, spans)
+        never = _never_given(file, run_id, unknown) | _out_of_order(frames, unknown, strange, began_ns)
         not_logged += len(unknown - strange - never)
         if strange | never:
             out[run_id] = strange | never
-    for run_id, frames in unheard.items():
-        if strange := _while_another_run_went_on(frames, spans):
-            out[run_id] = strange
+    if unheard:
+        periods = [
+            _period(frames, unknown | strange, goes_on=run_id == standing.runs[-1].run_id)
+            for run_id, (frames, strange, unknown) in compared.items()
+        ]
+        for run_id, frames in unheard.items():
+            if strange := _while_another_run_went_on(frames, list(filter(None, periods))):
+                out[run_id] = strange
     for run_id, strange in out.items():
         file.take_out(run_id, sorted(strange))
     taken_out = sum(map(len, out.values()))
@@ -140,11 +145,11 @@ def _never_given(file: RunLedger, run_id: int, unknown: set[int]) -> set[int]:
 
 
 def _out_of_order(
-    frames: RecordedFrames, unknown: set[int], strange: set[int], spans: list[tuple[Times, Times]]
+    frames: RecordedFrames, unknown: set[int], strange: set[int], began_ns: list[int]
 ) -> set[int]:
     """Of the numbers that the log does not have, those whose time is not between the times of the logged
-    frames before and after, the first ones of later runs among these: capture numbers its frames as time
-    goes, one run after another. That is known of a killed capture too.
+    frames before and after, the first ones of later runs (``began_ns``) among these: capture numbers its
+    frames as time goes, one run after another. That is known of a killed capture too.
     """
     if not unknown:
         return set()
@@ -159,33 +164,45 @@ def _out_of_order(
         at_ns = time_ns[row]
         before_ns = time_ns[logged[at - 1]] if at > 0 else at_ns - 1
         is_late = at < len(logged) and at_ns >= time_ns[logged[at]]
-        if at_ns <= before_ns or is_late or any(before_ns < first[0] <= at_ns for first, _ in spans):
+        if at_ns <= before_ns or is_late or any(before_ns < first_ns <= at_ns for first_ns in began_ns):
             impossible.add(sequences[row])
     return impossible
 
 
-def _span(frames: RecordedFrames, not_logged: set[int], *, goes_on: bool) -> list[tuple[Times, Times]]:
-    """The times of the first and the last logged frame, if there is one; a run that goes on has no last."""
-    logged = [row for row, number in enumerate(frames.sequences.tolist()) if number not in not_logged]
+def _first_logged_ns(frames: RecordedFrames, not_logged: set[int]) -> list[int]:
+    """The time of a run's first logged frame, if there is one."""
+    for row, number in enumerate(frames.sequences.tolist()):
+        if number not in not_logged:
+            return [_times(frames, [row])[0][0]]
+    return []
+
+
+def _period(frames: RecordedFrames, not_logged: set[int], *, goes_on: bool) -> tuple[Times, Times] | None:
+    """When a run went on, by its logged frames: earliest and latest by each clock, as the wall clock may have
+    been set meanwhile; one that goes on has no latest. None where nothing is logged.
+    """
+    logged = [times for number, times in _numbered_times(frames) if number not in not_logged]
     if not logged:
-        return []
-    first, last = _times(frames, [logged[0], logged[-1]])
-    return [(first, NEVER if goes_on else last)]
+        return None
+    monotonic_ns, wall_ns = zip(*logged, strict=True)
+    return (min(monotonic_ns), min(wall_ns)), NEVER if goes_on else (max(monotonic_ns), max(wall_ns))
 
 
-def _while_another_run_went_on(frames: RecordedFrames, spans: list[tuple[Times, Times]]) -> set[int]:
+def _numbered_times(frames: RecordedFrames) -> Iterator[tuple[int, Times]]:
+    for begin in range(0, len(frames), ROWS_AT_ONCE):
+        rows = slice(begin, begin + ROWS_AT_ONCE)
+        yield from zip(frames.sequences[rows].tolist(), _times(frames, rows), strict=True)
+
+
+def _while_another_run_went_on(frames: RecordedFrames, periods: list[tuple[Times, Times]]) -> set[int]:
     """Of a run that no log is there of, the numbers of the frames that were captured, by both clocks, while a
     logged run went on: a capture has one run at a time.
     """
-    impossible = set()
-    for begin in range(0, len(frames), ROWS_AT_ONCE):
-        rows = slice(begin, begin + ROWS_AT_ONCE)
-        for number, (at_ns, wall_ns) in zip(
-            frames.sequences[rows].tolist(), _times(frames, rows), strict=True
-        ):
-            if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in spans):
-                impossible.add(number)
-    return impossible
+    return {
+        number
+        for number, (at_ns, wall_ns) in _numbered_times(frames)
+        if any(first[0] <= at_ns <= last[0] and first[1] <= wall_ns <= last[1] for first, last in periods)
+    }
 
 
 def _compared(
