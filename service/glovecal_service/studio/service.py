@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
@@ -21,7 +22,7 @@ from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 
 PATIENCE_S = 300.0
 Found = TypeVar("Found")
-_TOKENS: WeakKeyDictionary[Slot, str | None] = WeakKeyDictionary()
+_BROWSERS: WeakKeyDictionary[Slot, _Browser] = WeakKeyDictionary()
 """Of the parts of pages that asked for something: a part may clear itself and go on asking."""
 
 
@@ -46,32 +47,59 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
         tell(str(refusal))
 
 
-def _session() -> dict[str, str]:
-    """The cookie with which the page was opened: what it asks is asked by who opened it."""
-    if not context.slot_stack:
-        return {}
-    part = context.slot
-    try:
-        request = context.client.request
-        _TOKENS[part] = None if request is None else request.cookies.get(SESSION_COOKIE)
-    except RuntimeError:
-        pass  # the part of the page in which this began was cleared since it asked first
-    token = _TOKENS.get(part)
-    return {} if token is None else {"Cookie": f"{SESSION_COOKIE}={token}"}
+@dataclass(frozen=True)
+class _Browser:
+    """Who opened a page: what the page asks is asked by them."""
+
+    session: str | None = None
+    address: str = ""
+
+    @classmethod
+    def here(cls) -> _Browser:
+        if not context.slot_stack:
+            return cls()
+        part = context.slot
+        try:
+            request = context.client.request
+            if request is not None:
+                address = request.client.host if request.client else ""
+                _BROWSERS[part] = cls(request.cookies.get(SESSION_COOKIE), address)
+        except RuntimeError:
+            pass  # the part of the page in which this began was cleared since it asked first
+        return _BROWSERS.get(part, cls())
+
+    @property
+    def origin(self) -> str:
+        """As the log of changes has it."""
+        return f"{STUDIO} {self.address}".rstrip()
 
 
 def has_session() -> bool:
     """Whether somebody logged in to see this page."""
-    return bool(_session())
+    return _Browser.here().session is not None
+
+
+_ORIGIN = "origin"
+
+
+class _InProcess(httpx.AsyncBaseTransport):
+    """To the application, each request from the browser for which a page asks."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self._app = app
+
+    async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
+        client = (request.extensions[_ORIGIN], 0)
+        transport = httpx.ASGITransport(self._app, raise_app_exceptions=False, client=client)
+        return await transport.handle_async_request(request)
 
 
 class Service:
     """Paths are below ``/v1``: ``await service.get("/takes", subject="anna")``; answers are plain data."""
 
     def __init__(self, app: FastAPI) -> None:
-        transport = httpx.ASGITransport(app, raise_app_exceptions=False, client=(STUDIO, 0))
         self._http = httpx.AsyncClient(
-            base_url="http://localhost/v1", transport=transport, timeout=PATIENCE_S, trust_env=False
+            base_url="http://localhost/v1", transport=_InProcess(app), timeout=PATIENCE_S, trust_env=False
         )
 
     async def get(self, path: str, **query: Any) -> Any:
@@ -123,10 +151,13 @@ class Service:
     ) -> httpx.Response:
         """Raises Refusal."""
         given = {name: value for name, value in query.items() if value is not None}
-        headers = _session() | ({"Content-Type": media_type} if media_type else {})
+        browser = _Browser.here()
+        headers = {"Cookie": f"{SESSION_COOKIE}={browser.session}"} if browser.session else {}
         answer = await self._http.request(
-            method, path, params=given, json=body, content=content, headers=headers
-        )
+            method, path, params=given, json=body, content=content,
+            headers=headers | ({"Content-Type": media_type} if media_type else {}),
+            extensions={_ORIGIN: browser.origin},
+        )  # fmt: skip
         if answer.is_success:
             return answer
         try:

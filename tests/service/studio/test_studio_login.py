@@ -104,6 +104,7 @@ def test_an_admin_makes_and_revokes_keys_and_sees_who_changed_what(opened: Open)
     made = page.get_by_label("The key; it is not shown again")
     expect(made).to_have_value(re.compile("glk_.+"))
     expect(page.get_by_role("cell", name="keys guest")).to_be_visible()
+    expect(page.get_by_role("cell", name="studio 127.0.0.1").first).to_be_visible()
     assert serious(page) == []
     page.get_by_role("button", name="Make a key").click()
     expect(page.get_by_text("names are not used again")).to_be_visible()

@@ -63,8 +63,8 @@ REQUEST_ID = re.compile(r"[A-Za-z0-9_-]{8,64}\Z")
 SESSION_COOKIE = "glovecal_session"
 """Of a browser in which somebody logged in."""
 STUDIO = "studio"
-"""The client's name in requests that its pages make, and where they are: looking there again and again
-fills no log."""
+"""How the client is called in requests that its pages make, before the browser's address, and where they are:
+looking there again and again fills no log."""
 OFTEN = (f"{PREFIX}/cameras/{{glove}}/picture", f"{PREFIX}/recordings")
 """Routes asked for ten times a second: by each page that shows a camera's picture, and by
 ``glovecal trigger`` that waits for recordings to begin."""
@@ -97,7 +97,9 @@ class Observation:
     def _note(self, scope: Scope, answer: _Answer, request_id: str, seconds: float) -> None:
         route = _route(scope)
         self.metrics.answered(scope["method"], route, answer.status, seconds)
-        for_a_page = (scope.get("client") or ("",))[0] == STUDIO or scope["path"].startswith(f"/{STUDIO}/")
+        for_a_page = (scope.get("client") or ("",))[0].startswith(STUDIO) or scope["path"].startswith(
+            f"/{STUDIO}/"
+        )
         only_looks = (for_a_page or route in OFTEN) and scope["method"] == "GET" and answer.status < 400
         request = Event(
             "request",
