@@ -1,8 +1,9 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Six parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
-to pose through real zenoh, inverse kinematics against mink, the studio's Live page in a browser, live
-bridges, and retargeting to skeletons like those of other programs. Figures and the picture go to a folder.
+Seven parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+to pose through real zenoh, the same with a site's certificates beside one without, inverse kinematics against
+mink, the studio's Live page in a browser, live bridges, and retargeting to skeletons like those of other
+programs. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ HERE = Path(__file__).resolve().parent
 PARTS = {
     "gaussian-process": "gaussian_process_bench.py",
     "streaming": "streaming_bench.py",
+    "certificates": "certificates_bench.py",
     "inverse-kinematics": "inverse_kinematics_bench.py",
     "studio": "studio_bench.py",
     "bridges": "bridges_bench.py",
     "retargeting": "retargeting_table.py",
 }
-USUAL = tuple(name for name in PARTS if name not in ("studio", "bridges", "retargeting"))
-"""The first two want a quiet computer, the studio a browser too; the last has no peer."""
+USUAL = tuple(name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting"))
+"""The first three want a quiet computer, the studio a browser too; the last has no peer."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 

@@ -126,13 +126,13 @@ def _gloves_case(count: int, seconds: float) -> Case:
 def run(case: Case) -> dict[str, Any]:
     """One case in a fresh service."""
     with tempfile.TemporaryDirectory(prefix="glovecal-bench-") as folder, ExitStack() as running:
-        settings = Settings(data=Path(folder), zenoh=f"tcp/127.0.0.1:{_free_port()}")
-        _store_models(settings, case)
-        service = running.enter_context(_service(settings))
+        settings = Settings(data=Path(folder), zenoh=f"tcp/127.0.0.1:{free_port()}")
+        store_models(settings, case)
+        process = running.enter_context(service(settings))
         load = Load(settings.zenoh, settings.site, case.gloves, PEOPLE, case.rate_hz, case.seconds)
-        driver, driving = running.enter_context(_helper(drive, load))
+        driver, driving = running.enter_context(helper(drive, load))
         driver.recv()
-        with ProcessCost(service) as cost, ProcessCost(driving) as load_cost:
+        with ProcessCost(process) as cost, ProcessCost(driving) as load_cost:
             driver.send("start")
             sent = driver.recv()
         status = _service_status(settings)
@@ -226,7 +226,7 @@ def print_result(result: dict[str, Any]) -> None:
         )
 
 
-def _store_models(settings: Settings, case: Case) -> None:
+def store_models(settings: Settings, case: Case) -> None:
     with Store.open(settings) as store:
         for number in range(min(case.gloves, PEOPLE)):
             subject = f"person{number}"
@@ -281,7 +281,7 @@ def _random_rotation(
 
 
 @contextmanager
-def _service(settings: Settings) -> Iterator[int]:
+def service(settings: Settings) -> Iterator[int]:
     """The id of the real-time process."""
     ready = SPAWN.Event()
     end, held = SPAWN.Pipe(duplex=False)
@@ -297,15 +297,17 @@ def _service(settings: Settings) -> Iterator[int]:
 
 
 @contextmanager
-def _helper(work: Callable[..., None], *arguments: Any) -> Iterator[tuple[Any, int]]:
+def helper(work: Callable[..., None], *arguments: Any) -> Iterator[tuple[Any, int]]:
     """A process with a pipe to it, and its id."""
     here, there = SPAWN.Pipe()
     process = SPAWN.Process(target=work, args=(there, *arguments))
     process.start()
+    there.close()  # or nobody would hear that it died
     try:
         assert process.pid is not None
         yield here, process.pid
     finally:
+        here.close()
         process.join(10)
         if process.is_alive():
             process.terminate()
@@ -318,7 +320,7 @@ def _service_status(settings: Settings) -> dict[str, Any]:
         return ask_json(session, key, timeout_s=5.0)
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

@@ -15,6 +15,8 @@ import struct
 import time
 import zlib
 from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Thread
@@ -49,41 +51,58 @@ class Load:
     people: int
     rate_hz: float
     seconds: float
+    members: tuple[str, str] | None = None
+    """Files of the members of a site that send frames and hear poses."""
 
 
 def drive(pipe: Any, load: Load) -> None:
-    """Connect, wait for models, say "ready", stream when told to, then send what was sent and what came."""
+    """Connect, wait for models, say "ready"; then, as told: "start" streams, and sends how many were sent;
+    "enough" sends what came since the last time it was told so. Ends when nobody tells any more.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with open_client([load.endpoint]) as session:
+    with _session(load, 0) as session, _session(load, 1) as hearing:
         gloves = [GloveKeys(load.site, f"glove{number}") for number in range(load.gloves)]
         messages = [_Messages(number) for number in range(load.gloves)]
         watch = _Watch()
-        subscriber = session.declare_subscriber(
+        subscriber = hearing.declare_subscriber(
             all_gloves(load.site, "pose"), zenoh.handlers.Callback(watch.hear)
         )
-        for keys, of_glove in zip(gloves, messages, strict=True):
-            session.put(keys.meta, json.dumps({**of_glove.meta(load.people), "glove": keys.glove}))
-        _wait_until_calibrated(session, gloves)
+        sent = _stream_until_calibrated(load, session, hearing, gloves, messages)
         publishers = [
             session.declare_publisher(keys.raw, priority=zenoh.Priority.INTERACTIVE_HIGH) for keys in gloves
         ]
         gc.disable()
         pipe.send("ready")
-        pipe.recv()
-        pipe.send(_stream(load, publishers, messages))
-        pipe.recv()
+        with suppress(EOFError):
+            while True:
+                if pipe.recv() == "start":
+                    sent += _stream(load, publishers, messages, sent)
+                    pipe.send(sent)
+                else:
+                    pipe.send((np.array(watch.latency_ns) / 1e6, np.array(watch.age_us) / 1e3))
+                    watch.forget()
         subscriber.undeclare()
-        pipe.send((np.array(watch.latency_ns) / 1e6, np.array(watch.age_us) / 1e3))
 
 
-def _stream(load: Load, publishers: list[zenoh.Publisher], messages: list[_Messages]) -> int:
-    """Frames at even spacing over all gloves, put as they fall due; how many were sent."""
+@contextmanager
+def _session(load: Load, member: int) -> Iterator[zenoh.Session]:
+    if load.members is not None:
+        os.environ["GLOVECAL_SITE_FILE"] = load.members[member]
+    with open_client([load.endpoint]) as session:
+        yield session
+
+
+def _stream(load: Load, publishers: list[zenoh.Publisher], messages: list[_Messages], before: int) -> int:
+    """Frames at even spacing over all gloves, put as they fall due; how many were sent.
+
+    ``before``: how many were sent earlier.
+    """
     per_second, count = load.rate_hz * len(publishers), len(publishers)
     total, sent = int(per_second * load.seconds), 0
     start = time.monotonic()
     while sent < total:
         due = min(int((time.monotonic() - start) * per_second), total)
-        for number in range(sent, due):
+        for number in range(before + sent, before + due):
             sequence, glove = divmod(number, count)
             publishers[glove].put(messages[glove].message(sequence))
         sent = due
@@ -127,6 +146,9 @@ class _Watch:
     def __init__(self) -> None:
         self.latency_ns, self.age_us = array("q"), array("L")
 
+    def forget(self) -> None:
+        del self.latency_ns[:], self.age_us[:]
+
     def hear(self, sample: zenoh.Sample) -> None:
         now, pose = time.monotonic_ns(), sample.payload.to_bytes()
         if not pose[_POSE_FLAGS_AT] & _STALE:
@@ -134,13 +156,22 @@ class _Watch:
             self.age_us.append(_POSE_AGE.unpack_from(pose, _POSE_AGE_AT)[0])
 
 
-def _wait_until_calibrated(session: zenoh.Session, gloves: list[GloveKeys]) -> None:
+def _stream_until_calibrated(
+    load: Load, session: zenoh.Session, hearing: zenoh.Session, gloves: list[GloveKeys],
+    messages: list[_Messages],
+) -> int:  # fmt: skip
+    """A frame of each now and then, as a glove is there with its first frame; how many frames were sent."""
     deadline = time.monotonic() + 120
-    for keys in gloves:
-        while not _is_calibrated(session, keys):
-            if time.monotonic() > deadline:
-                raise RuntimeError(f"glove {keys.glove} was given no model in 120 s")
-            time.sleep(0.1)
+    for number in range(1200):
+        for keys, of_glove in zip(gloves, messages, strict=True):
+            session.put(keys.meta, json.dumps({**of_glove.meta(load.people), "glove": keys.glove}))
+            session.put(keys.raw, of_glove.message(number))
+        if all(_is_calibrated(hearing, keys) for keys in gloves):
+            return (number + 1) * len(gloves)
+        if time.monotonic() > deadline:
+            break
+        time.sleep(0.1)
+    raise RuntimeError("the gloves were given no model in 120 s")
 
 
 def _is_calibrated(session: zenoh.Session, keys: GloveKeys) -> bool:

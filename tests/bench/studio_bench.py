@@ -213,10 +213,12 @@ def _driver(load: Load) -> Iterator[Any]:
     here, there = spawn.Pipe()
     process = spawn.Process(target=drive, args=(there, load))
     process.start()
+    there.close()  # or nobody would hear that it died
     try:
         here.recv()
         yield here
     finally:
+        here.close()
         process.join(10)
         if process.is_alive():
             process.terminate()

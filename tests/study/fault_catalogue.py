@@ -319,7 +319,7 @@ CATALOGUE = (
     CatalogueFault(
         32, "all at once", "500 faults a night, every frame and every acknowledged write accounted for",
         ("tests/study/test_fault_study.py::test_thirty_faults_lose_nothing", *_drawn(*KINDS)),
-        "500 faults in one run; what is open is told above",
+        "what is open is told above",
     ),
 )  # fmt: skip
 

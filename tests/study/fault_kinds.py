@@ -239,7 +239,7 @@ class Pace:
 STUDY_PACE = Pace((1, 5), 4.0)
 SUITE_PACE = Pace((5, 5), 1.0, without=("link that changes bytes",))
 """Over plain TCP nothing notices bytes of zenoh itself that changed behind its checksum: open, see
-docs/faults.md. Poses stayed away for a minute in two of a hundred and thirty groups, both with such a
+docs/faults.md. Poses stayed away for a minute in three of some five hundred groups, all with such a
 link."""
 
 
