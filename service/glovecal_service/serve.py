@@ -196,7 +196,7 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
         return f"{not_installed('the studio', 'nicegui')} (or leave it out: glovecal serve --no-studio)"
     try:
         with Store.open(settings) as store:
-            if asks_who(settings) and not store.keys.is_any:
+            if asks_who(settings) and not (store.keys.has_admin or store.people.has_admin):
                 return (
                     f"on {settings.host} the service asks everybody who they are (GLOVECAL_HOST, "
                     "GLOVECAL_LOGIN), and there is no admin yet; make one: glovecal key add NAME --role admin"

@@ -22,7 +22,7 @@ from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.logs import Word
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.rest import asking
-from glovecal_service.rest.access import audit, keys, login
+from glovecal_service.rest.access import audit, keys, login, people
 from glovecal_service.rest.effect import (
     catalogue,
     picture,
@@ -126,7 +126,7 @@ ROUTERS = (
         trial,
     ),
     *(jobs, overview, health),
-    *(keys, audit),
+    *(keys, people, audit),
 )
 
 

@@ -20,9 +20,11 @@ from glovecal_service.store.jobs import Jobs
 from glovecal_service.store.keys import Keys
 from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
+from glovecal_service.store.people import People
 from glovecal_service.store.recordings import Recordings
 from glovecal_service.store.samplings import Samplings
 from glovecal_service.store.schema import upgrade
+from glovecal_service.store.sessions import Sessions
 from glovecal_service.store.subjects import Subjects
 from glovecal_service.store.takes import Takes
 
@@ -45,6 +47,8 @@ class Store:
         self.samplings = Samplings(database)
         self.jobs = Jobs(database, clock)
         self.keys = Keys(database)
+        self.people = People(database)
+        self.sessions = Sessions(database)
         self.audit = Audit(database)
         self.revision = Revision(database)
 

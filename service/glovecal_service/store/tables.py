@@ -322,14 +322,17 @@ keys = Table(
     "keys",
     metadata,
     Column("name", NAME, primary_key=True),
-    Column("sha256", SHA256, nullable=False),
+    Column("sha256", SHA256),
     Column("role", String(16), nullable=False),
     Column("subjects", Json),
     Column("created_at", UtcTime, nullable=False),
     Column("revoked_at", UtcTime),
+    Column("password", Text),
+    Column("password_changed_at", UtcTime),
     Column("row_sha256", SHA256, nullable=False),
     UniqueConstraint("sha256"),
 )
+"""Of a key ``sha256``, of a person ``password`` (PHC format)."""
 
 sessions = Table(
     "sessions",

@@ -133,7 +133,7 @@ def _log_out() -> None:
     ui.run_javascript(_LOG_OUT)
 
 
-_LOG_OUT = """await fetch("../login", {method: "DELETE"}); location = "../login?page=/studio";"""
+_LOG_OUT = """await fetch("../login", {method: "DELETE"}); location = "../login?page=/studio/start";"""
 
 
 # Jobs on every page: what runs and how far it is, cancel, result; what finished meanwhile is announced.

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
-from cli_running import Run, glovecal
+import pytest
+from cli_running import COMMAND, Answer, Run, environment, glovecal
+from terminal_process import on_terminal
 
 
 def test_a_key_is_made_listed_and_revoked_and_the_log_tells_it(run: Run, tmp_path: Path) -> None:
@@ -49,3 +52,51 @@ def test_a_service_that_others_reach_does_not_start_without_an_admin(tmp_path: P
     assert "make one: glovecal key add NAME --role admin" in refused.said
     beyond = glovecal(settings | {"GLOVECAL_HOST": "0.0.0.0"}, "serve")
     assert "glovecal site init --host NAME" in beyond.said
+
+
+def test_a_person_is_added_changed_and_removed_and_the_password_is_never_an_argument(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def typed(password: str, *verb: str) -> Answer:
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"{password}\n"))
+        return run("person", *verb)
+
+    assert run("subject", "add", "ben").code == 0
+    made = typed("correct horse battery", "add", "anna", "--role", "trainer", "--subject", "ben")
+    assert made.code == 0, made.err
+    assert "anna (trainer, of ben alone) logs in at /login" in made.out
+    short = typed("too short", "add", "carla")
+    assert short.code == 1
+    assert "9 characters; give one of 12 to 200" in short.said
+    assert "give --role, --subject or --everybody" in run("person", "change", "anna").said
+    changed = run("person", "change", "anna", "--role", "operator")
+    assert "anna has the role operator now, of ben alone" in changed.out
+    assert "everybody's takes and models" in run("person", "change", "anna", "--everybody").out
+    assert typed("staple battery horse", "password", "anna").code == 0
+    assert "there is no person 'ana'; did you mean 'anna'" in run("person", "remove", "ana").said
+    assert run("person", "remove", "anna").code == 0
+    listed = run("person", "list", "--json").json
+    assert [(row["name"], row["role"], row["subjects"]) for row in listed] == [("anna", "operator", None)]
+    assert listed[0]["revoked_at"]
+    assert "anna" in run("person", "list").out
+    assert "keys anna" in run("audit", "list").out
+    assert "each as it was written" in run("audit", "verify").out
+
+
+def test_a_password_is_typed_twice_and_not_shown(tmp_path: Path) -> None:
+    settings = environment({"GLOVECAL_DATA": str(tmp_path / "data")})
+    with on_terminal([*COMMAND, "person", "add", "anna"], settings) as terminal:
+        for question, password in (
+            ("Password of anna: ", "correct horse battery"),
+            ("The same again: ", "staple battery horse"),
+            ("do not match", ""),
+            ("Password of anna: ", "correct horse battery"),
+            ("The same again: ", "correct horse battery"),
+        ):
+            terminal.wait_for(question)
+            terminal.said = terminal.said.partition(question)[2]
+            if password:
+                terminal.type(f"{password}\n")
+        terminal.wait_for("logs in at /login")
+        assert terminal.end() == 0
+        assert "horse" not in terminal.said

@@ -43,7 +43,8 @@ TRAINERS = {
     "GET /subjects/{name}/export",
 }
 ADMINS = {"DELETE /subjects/{name}", "GET /keys", "POST /keys", "DELETE /keys/{name}", "GET /audit",
-          "GET /audit/check", "POST /erasures"}  # fmt: skip
+          "GET /audit/check", "POST /erasures", "GET /people", "POST /people", "PUT /people/{name}",
+          "PUT /people/{name}/password", "DELETE /people/{name}"}  # fmt: skip
 
 
 def expected(method: str, path: str) -> Role:
@@ -68,15 +69,17 @@ class Site:
     guard: httpx.Client
     """The guard with nothing behind it: what it lets through is answered 204."""
     keys: dict[str, str]
+    proofs: dict[str, dict[str, str]]
+    """Headers by which it is known who asks: a key, or the session of a person."""
     ids: dict[str, dict[str, str]]
     """By subject: ids of what is theirs."""
 
     def ask(self, who: str | None, method: str, path: str, **more: Any) -> httpx.Response:
-        headers = {} if who is None else {"Authorization": f"Bearer {self.keys[who]}"}
+        headers = {} if who is None else self.proofs[who]
         return self.http.request(method, path, headers=headers, **more)
 
     def ask_guard(self, who: str, method: str, path: str) -> httpx.Response:
-        return self.guard.request(method, path, headers={"Authorization": f"Bearer {self.keys[who]}"})
+        return self.guard.request(method, path, headers=self.proofs[who])
 
 
 def guard_of(app: FastAPI) -> Any:
@@ -93,7 +96,8 @@ def guard_of(app: FastAPI) -> Any:
 
 
 @contextmanager
-def site(data: Path, **settings: Any) -> Iterator[Site]:
+def site(data: Path, *, of_people: bool = False, **settings: Any) -> Iterator[Site]:
+    """Asked with keys, or by people who logged in."""
     chosen = Settings(data=data, login="always", **settings)
     store = Store.open(chosen)
     store.layouts.put(LAYOUT)
@@ -105,6 +109,10 @@ def site(data: Path, **settings: Any) -> Iterator[Site]:
         ids[name] = {"name": name, "model": model, "take": take.id, "job": job.id}
     keys = {role: store.keys.create(role, role)[1] for role in ROLES}
     keys |= {f"anna's {role}": store.keys.create(f"anna-{role}", role, ["anna"])[1] for role in ROLES[:-1]}
+    proofs = {who: bearer(key) for who, key in keys.items()}
+    if of_people:
+        proofs = {role: logged_in(store, role, None) for role in ROLES}
+        proofs |= {f"anna's {role}": logged_in(store, role, ["anna"]) for role in ROLES[:-1]}
     app = create_app(chosen, store)
     with (
         start_blocking_portal() as portal,
@@ -114,14 +122,25 @@ def site(data: Path, **settings: Any) -> Iterator[Site]:
             transport=PortalTransport(guard_of(app), portal), base_url="http://localhost/v1"
         ) as guard,
     ):
-        yield Site(store, http, guard, keys, ids)
+        yield Site(store, http, guard, keys, proofs, ids)
     store.close()
 
 
-@pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with site(tmp_path_factory.mktemp("asked") / "data") as found:
+@pytest.fixture(scope="module", params=["keys", "people"])
+def asked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    data = tmp_path_factory.mktemp("asked") / "data"
+    with site(data, of_people=request.param == "people") as found:
         yield found
+
+
+def bearer(key: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {key}"}
+
+
+def logged_in(store: Store, role: Role, subjects: list[str] | None) -> dict[str, str]:
+    name = f"who-{role}-{'all' if subjects is None else '-'.join(subjects)}"
+    token = store.sessions.begin(store.people.create(name, role, subjects, password="long enough by far"))
+    return {"Cookie": f"{SESSION_COOKIE}={token}"}
 
 
 def routes(of: Site) -> list[tuple[str, str]]:
@@ -211,7 +230,7 @@ def test_nothing_is_made_or_changed_for_another_subject(asked: Site) -> None:
 
 def test_a_revoked_key_opens_nothing_from_the_next_request_on(asked: Site) -> None:
     made = asked.ask("admin", "POST", "/keys", json={"name": "short-lived", "role": "viewer"}).json()
-    asked.keys["short-lived"] = made["key"]
+    asked.proofs["short-lived"] = bearer(made["key"])
     assert asked.ask("short-lived", "GET", "/subjects").status_code == 200
     assert asked.ask("short-lived", "GET", "/keys").status_code == 403
     assert asked.ask("admin", "DELETE", "/keys/short-lived").json()["revoked_at"]
@@ -247,7 +266,7 @@ def test_a_page_asks_for_a_key_once(asked: Site) -> None:
     assert "no key of this service" in wrong.text
     form = {"key": asked.keys["viewer"], "page": "https://evil.example/studio"}
     let_in = asked.http.post(f"{address}/login", data=form)
-    assert (let_in.status_code, let_in.headers["location"]) == (303, "/studio")
+    assert (let_in.status_code, let_in.headers["location"]) == (303, "/")
     cookie = let_in.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=strict" in cookie

@@ -19,6 +19,7 @@ from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
 pytestmark = pytest.mark.needs_chromium
+PASSWORD, OTHER = "correct horse battery", "staple battery horse"
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,7 @@ def asking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, dict
         keys = {"of anna": store.keys.create("of-anna", "trainer", ["anna"])[1]}
         keys["training"] = store.keys.create("training", "trainer")[1]
         keys["looking"] = store.keys.create("looking", "viewer")[1]
+        store.people.create("lena", "viewer", password=PASSWORD)
     with ExitStack() as running:
         running.enter_context(part_of_service(web, settings))
         yield f"http://127.0.0.1:{port}", keys
@@ -50,16 +52,16 @@ def test_a_key_is_typed_once_and_pages_show_what_is_its(
     page.goto(f"{address}/studio/models")
     expect(page).to_have_url(f"{address}/login?page=/studio/models")
     page.get_by_label("Your key").fill("glk_wrong")
-    page.get_by_role("button", name="Log in").click()
+    page.get_by_role("button", name="Log in with a key").click()
     expect(page.get_by_role("alert")).to_contain_text("no key of this service")
     page.get_by_label("Your key").fill(keys["of anna"])
-    page.get_by_role("button", name="Log in").click()
+    page.get_by_role("button", name="Log in with a key").click()
     expect(page).to_have_url(f"{address}/studio/models")
     expect(page.get_by_role("heading", name="Models", level=1)).to_be_visible()
     expect(page.get_by_text("anna").first).to_be_visible()
     expect(page.get_by_text("ben", exact=True)).to_have_count(0)
     page.get_by_role("button", name="Log out").click()
-    expect(page).to_have_url(f"{address}/login?page=/studio")
+    expect(page).to_have_url(f"{address}/login?page=/studio/start")
     assert complaints == []
     context.close()
 
@@ -75,7 +77,7 @@ def test_a_part_of_a_page_that_clears_itself_asks_on_as_who_opened_it(
     page = context.new_page()
     page.goto(f"{address}/login?page=/studio/takes%3Fwho=mona")
     page.get_by_label("Your key").fill(keys["training"])
-    page.get_by_role("button", name="Log in").click()
+    page.get_by_role("button", name="Log in with a key").click()
     drop(page, [motion_file(tmp_path / "optical.trc", angles[1], from_s=LATE_S)])
     page.get_by_role("button", name="Attach to the take").click()
     expect(page.get_by_role("heading", name="Train a model of mona")).to_be_visible()
@@ -89,7 +91,7 @@ def test_who_may_look_only_is_told_so(browser: Browser, asking: tuple[str, dict[
     page = context.new_page()
     page.goto(f"{address}/login?page=/studio/start")
     page.get_by_label("Your key").fill(keys["looking"])
-    page.get_by_role("button", name="Log in").click()
+    page.get_by_role("button", name="Log in with a key").click()
     expect(page.get_by_role("heading", level=1)).to_be_visible()
     page.get_by_role("button", name="simulated glove").first.click()
     expect(page.get_by_text("Key looking is of a viewer; this needs operator")).to_be_visible()
@@ -113,4 +115,63 @@ def test_an_admin_makes_and_revokes_keys_and_sees_who_changed_what(opened: Open)
     expect(page.get_by_role("button", name="Revoke guest")).to_have_count(0)
     page.get_by_role("button", name="Look whether the log is what was written").click()
     expect(page.get_by_text(re.compile("[0-9]+ entries, each as it was written"))).to_be_visible()
+    assert seen.complaints == []
+
+
+def test_a_name_and_a_password_are_typed_and_the_password_is_changed(
+    browser: Browser, asking: tuple[str, dict[str, str]]
+) -> None:
+    address, _ = asking
+    context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme="dark")
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(f"{address}/studio/models")
+    assert serious(page) == []
+    page.get_by_label("Name").fill("lena")
+    page.get_by_label("Password").fill("wrong wrong wrong")
+    page.get_by_role("button", name="Log in", exact=True).click()
+    expect(page.get_by_role("alert")).to_contain_text("do not belong together")
+    page.get_by_role("link", name="Change your password").click()
+    assert serious(page) == []
+    page.get_by_label("Name").fill("lena")
+    page.get_by_label("Password", exact=True).fill(PASSWORD)
+    page.get_by_label("New password, at least").fill(OTHER)
+    page.get_by_label("The new password again").fill(OTHER)
+    page.get_by_role("button", name="Change the password").click()
+    expect(page.get_by_role("alert")).to_contain_text("is changed")
+    page.get_by_label("Name").fill("Lena")
+    page.get_by_label("Password").fill(OTHER)
+    page.get_by_role("button", name="Log in", exact=True).click()
+    page.get_by_role("link", name="Studio").first.click()
+    page.get_by_role("button", name="Log out").click()
+    expect(page).to_have_url(f"{address}/login?page=/studio/start")
+    context.close()
+
+
+def test_an_admin_adds_changes_and_removes_people(opened: Open) -> None:
+    seen = opened("access")
+    page = seen.page
+    page.get_by_label("Name of the person").fill("carla")
+    page.get_by_label("Password, at least 12 characters").fill("too short")
+    page.get_by_role("button", name="Add the person").click()
+    expect(page.get_by_text("a password of 9 characters; give one of 12")).to_be_visible()
+    page.get_by_label("Password, at least 12 characters").fill(PASSWORD)
+    page.get_by_role("button", name="Add the person").click()
+    row = page.get_by_role("row").filter(has=page.get_by_role("button", name="Change carla"))
+    expect(row).to_contain_text("viewer")
+    expect(page.get_by_label("Password, at least 12 characters")).to_have_value("")
+    assert serious(page) == []
+    page.get_by_role("button", name="Change carla").click()
+    dialog = page.get_by_role("dialog", name="Change a person")
+    dialog.get_by_label("Role").click()
+    page.get_by_role("option", name="operator").click()
+    assert serious(page) == []
+    dialog.get_by_label("New password").fill(OTHER)
+    dialog.get_by_role("button", name="Change", exact=True).click()
+    expect(row).to_contain_text("operator")
+    expect(page.get_by_text("carla is changed, and logs in again")).to_be_visible()
+    page.get_by_role("button", name="Remove carla").click()
+    expect(page.get_by_text("carla is removed, and logs in no more")).to_be_visible()
+    expect(page.get_by_role("button", name="Remove carla")).to_have_count(0)
+    expect(page.get_by_role("cell", name="keys carla").first).to_be_visible()
     assert seen.complaints == []

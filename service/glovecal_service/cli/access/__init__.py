@@ -1,1 +1,1 @@
-"""Keys and the log of changes: ``glovecal key``, ``glovecal audit``."""
+"""Keys, people and the log of changes: ``glovecal key``, ``glovecal person``, ``glovecal audit``."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 import typer
 
+from glovecal_client.site.roles import Role
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import out, print_json, print_table, read_or_print
@@ -17,16 +18,28 @@ app = typer.Typer(
 )
 
 
+RoleOption = Annotated[Role, typer.Option(help="Looks; records too; trains and activates too; everything.")]
+SubjectOption = Annotated[
+    list[str] | None, typer.Option("--subject", "-s", help="Of whom alone; default: of everybody.")
+]
+SCOPE_COLUMNS = {"role": "role", "subjects": "of", "created_at": "made"}
+
+
+def scope_row(row: Key) -> dict[str, Any]:
+    """As a table has it."""
+    return {**vars(row), "subjects": "everybody" if row.subjects is None else ", ".join(row.subjects)}
+
+
+def whose(row: Key) -> str:
+    """For a sentence: of whom it sees takes and models."""
+    return "everybody's takes and models" if row.subjects is None else f"of {', '.join(row.subjects)} alone"
+
+
 @app.command("add")
 def add(
     name: Annotated[str, typer.Argument(help="Who or what has it, such as anna or capture-3.")],
-    role: Annotated[
-        Literal["viewer", "operator", "trainer", "admin"],
-        typer.Option(help="Looks; records too; trains and activates too; everything."),
-    ] = "viewer",
-    subject: Annotated[
-        list[str] | None, typer.Option("--subject", "-s", help="Of whom alone; default: of everybody.")
-    ] = None,
+    role: RoleOption = "viewer",
+    subject: SubjectOption = None,
     as_json: AsJson = False,
 ) -> None:
     """Make a key and print it, once. Give it as GLOVECAL_KEY, or type it where the studio asks."""
@@ -36,11 +49,8 @@ def add(
         print_json(made.model_dump(mode="json"))
         return
     out.print(made.key, soft_wrap=True)
-    whose = (
-        "everybody's takes and models" if made.subjects is None else f"of {', '.join(made.subjects)} alone"
-    )
     out.print(
-        f"The key of {made.name} ({made.role}, {whose}); it is not shown again. "
+        f"The key of {made.name} ({made.role}, {whose(made)}); it is not shown again. "
         f"To undo: glovecal key revoke {name}"
     )
 
@@ -50,12 +60,12 @@ def list_keys(as_json: AsJson = False) -> None:
     """List keys, those that were revoked too."""
     with connect() as service:
         rows = read_or_print(list[Key], service.get("/keys"), as_json)
-    shown = [
-        {**vars(row), "subjects": "everybody" if row.subjects is None else ", ".join(row.subjects)}
-        for row in rows
-    ]
-    columns = {"name": "key", "role": "role", "subjects": "of", "created_at": "made", "revoked_at": "revoked"}
-    print_table(shown, columns, empty="No keys yet. Make one: glovecal key add NAME --role admin")
+    columns = {"name": "key", **SCOPE_COLUMNS, "revoked_at": "revoked"}
+    print_table(
+        [scope_row(row) for row in rows],
+        columns,
+        empty="No keys yet. Make one: glovecal key add NAME --role admin",
+    )
 
 
 @app.command("revoke")

@@ -1,1 +1,1 @@
-"""Keys, the login of the studio, and the log of changes."""
+"""Keys, people, the login of the studio, and the log of changes."""

@@ -1,4 +1,4 @@
-"""Keys and the log of changes as REST gives them."""
+"""Keys, people and the log of changes as REST gives them."""
 
 from __future__ import annotations
 
@@ -23,10 +23,14 @@ class NewKey(Key):
     key: str = Field(description="The key itself; nobody can be told it again.")
 
 
+class Person(Key):
+    password_changed_at: datetime
+
+
 class AuditRow(Row):
     id: int
     at: datetime
-    who: str = Field(description="The name of a key, or `this computer`.")
+    who: str = Field(description="The name of a key or a person, or `this computer`.")
     origin: str = Field(description="The address that the request came from.")
     action: str = Field(description="What was asked, such as `POST /v1/models/train`.")
     changes: list[dict[str, Any]] = Field(description="Rows: table, key, values before and after.")

@@ -12,39 +12,36 @@ from glovecal_service.request_types import StrictBody, SubjectName
 from glovecal_service.rest.access.answer import Key, NewKey
 from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.problem import change_problems, problems
-from glovecal_service.store.keys import KeyRecord
 
 router = APIRouter(prefix="/keys", tags=["access"])
 MOST_SUBJECTS = 1000
 
 
-class KeyBody(StrictBody):
-    name: SubjectName = Field(description="Of the key: who or what has it. Never used again.")
+class Scope(StrictBody):
     role: Role
     subjects: Annotated[list[SubjectName], Field(min_length=1, max_length=MOST_SUBJECTS)] | None = Field(
-        None, description="Whose takes and models it may see and change; null: everybody's."
+        None, description="Whose takes and models may be seen and changed; null: everybody's."
     )
+
+
+class KeyBody(Scope):
+    name: SubjectName = Field(description="Who or what has it. Never used again.")
 
 
 @router.get("", summary="Keys", responses=problems())
 def list_keys(store: StoreNeeded) -> list[Key]:
     """By name, those that were revoked among them."""
-    return [_row(record) for record in store.keys.list()]
+    return [Key.model_validate(record, from_attributes=True) for record in store.keys.list()]
 
 
 @router.post("", status_code=201, summary="Make a key", responses=change_problems(409))
 def add_key(body: KeyBody, store: StoreNeeded) -> NewKey:
     """The answer is the only place where it stands."""
     record, secret = store.keys.create(body.name, body.role, body.subjects)
-    return NewKey(**vars(_row(record)), key=secret)
+    return NewKey(**vars(Key.model_validate(record, from_attributes=True)), key=secret)
 
 
 @router.delete("/{name}", summary="Revoke a key", responses=change_problems())
 def revoke_key(name: str, store: StoreNeeded) -> Key:
     """From the next request on it opens nothing; sessions of the studio that began with it end."""
-    return _row(store.keys.revoke(name))
-
-
-def _row(record: KeyRecord) -> Key:
-    subjects = None if record.subjects is None else list(record.subjects)
-    return Key(**{**vars(record), "subjects": subjects})
+    return Key.model_validate(store.keys.revoke(name), from_attributes=True)

@@ -25,14 +25,14 @@ from glovecal_service.rest.http.request_guard import SAFE_METHODS
 from glovecal_service.store.actor import Actor
 from glovecal_service.store.errors import NotFound
 from glovecal_service.store.gloves import Gloves
-from glovecal_service.store.keys import KeyRecord, Keys
+from glovecal_service.store.principals import Principal
 from glovecal_service.store.store import Store
 
 FEED = re.compile(rf"/{STUDIO}/feed/([^/]+)")
 """Of a page that draws a glove's hand: poses, which no statement of the store narrows."""
 LOGIN = "/login"
 LONGEST_ACTION = 200
-OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}")
+OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}(/password)?")
 """What answers to everybody: it tells nothing of what is stored."""
 _ASKED_BY_POST = (
     r"models/[^/]+/(compare|where|explain|predict|replay|series|residual|report|calibration-report"
@@ -44,7 +44,7 @@ _OF_SESSIONS = (
     r"|hidden-effects|subjects|takes|uploads|videos)(/.*)?"
 )
 RULES: tuple[tuple[str, str, Role], ...] = (
-    (r".*", r"(keys|audit|erasures)(/.*)?", "admin"),
+    (r".*", r"(keys|people|audit|erasures)(/.*)?", "admin"),
     (r"DELETE", r"subjects/.*", "admin"),
     (r"GET|HEAD", r"subjects/[^/]+/export", "trainer"),
     (r"GET|HEAD|OPTIONS", r".*", "viewer"),
@@ -91,7 +91,7 @@ class AccessGuard:
             await self.app(scope, receive, send)
             return
         store: Store = scope["app"].state.parts.store
-        record = await run_in_threadpool(_who, store.keys, scope)
+        record = await run_in_threadpool(_who, store, scope)
         problem = _problem(record, method, path)
         if record is not None and problem is None:
             subjects = None if record.subjects is None else frozenset(record.subjects)
@@ -119,13 +119,13 @@ def _is_seen(gloves: Gloves, glove: str) -> bool:
     return True
 
 
-def _who(keys: Keys, scope: Scope) -> KeyRecord | None:
+def _who(store: Store, scope: Scope) -> Principal | None:
     headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
     kind, _, secret = headers.get(b"authorization", "").partition(" ")
     if kind.lower() == "bearer":
-        return keys.of(secret.strip())
+        return store.keys.of(secret.strip())
     token = session_token(headers.get(b"cookie", ""))
-    return None if token is None else keys.of_session(token)
+    return None if token is None else store.sessions.of(token)
 
 
 def session_token(cookies: str) -> str | None:
@@ -137,7 +137,7 @@ def session_token(cookies: str) -> str | None:
     return None if cookie is None else cookie.value
 
 
-def _problem(record: KeyRecord | None, method: str, path: str) -> Problem | None:
+def _problem(record: Principal | None, method: str, path: str) -> Problem | None:
     if record is None:
         return Problem(
             401,
@@ -150,13 +150,20 @@ def _problem(record: KeyRecord | None, method: str, path: str) -> Problem | None
         return None
     below = path.removeprefix(f"{PREFIX}/")
     if record.subjects is not None and NOT_OF_A_SUBJECT.fullmatch(below):
-        return Problem(404, "not-found", "There is nothing under this path for a key of some subjects.")
+        return Problem(404, "not-found", "There is nothing under this path for who sees some subjects only.")
     needed = role_for(method, below)
     if not includes(record.role, needed):
-        return Problem(
-            403,
-            "role-too-low",
-            f"Key {record.name} is of a {record.role}; this needs {needed}. An admin makes such, as in: "
-            "glovecal key add NAME --role operator.",
-        )
+        return Problem(403, "role-too-low", _too_low(record, needed))
     return None
+
+
+def _too_low(record: Principal, needed: Role) -> str:
+    if record.is_person:
+        return (
+            f"{record.name} has the role {record.role}; this needs {needed}. An admin changes that, as in: "
+            f"glovecal person change {record.name} --role {needed}."
+        )
+    return (
+        f"Key {record.name} is of a {record.role}; this needs {needed}. An admin makes such, as in: "
+        "glovecal key add NAME --role operator."
+    )

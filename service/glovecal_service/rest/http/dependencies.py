@@ -12,6 +12,7 @@ from glovecal_service.camera.started_cameras import CameraAccess
 from glovecal_service.filming import Filming
 from glovecal_service.first_run.simulated_glove import StreamedGlove
 from glovecal_service.questions.at_once import Predictors
+from glovecal_service.rest.http.guesses import Guesses
 from glovecal_service.rest.http.observation import Metrics
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
@@ -43,6 +44,8 @@ class Parts:
         default_factory=lambda: anyio.CapacityLimiter(LONG_ANSWERS_AT_ONCE)
     )
     """The same for answers that are worked out in a process of their own."""
+    guesses: Guesses = field(default_factory=Guesses)
+    """Who checks or makes a password waits here."""
 
     @property
     def videos(self) -> Videos:

@@ -1,18 +1,17 @@
-"""Keys and changes: who may do what, and who did."""
+"""Keys, people and changes: who may do what, and who did."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import get_args
 
 from nicegui import ui
 
-from glovecal_client.site.roles import Role
 from glovecal_service.plain import read
 from glovecal_service.rest.access.answer import AuditCheck, AuditRow, Key, NewKey
 from glovecal_service.rest.subject.answer import Subject
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import act, heading, main_act
+from glovecal_service.studio.pages.people import PeopleTable, ScopeChoice, whose
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -20,12 +19,6 @@ from glovecal_service.studio.table import cell, row_head, table
 
 SHOWN = 50
 """Changes, the newest."""
-MAY = {
-    "viewer": "looks",
-    "operator": "also records",
-    "trainer": "also trains and activates",
-    "admin": "does everything",
-}
 
 
 def add(studio: Studio) -> None:
@@ -46,20 +39,20 @@ class AccessPage:
     async def build(self) -> None:
         subjects = [row.name for row in await self._service.read(list[Subject], "/subjects")]
         heading(2, "Keys")
-        ui.label("Where others reach this service, each needs a key; on this computer alone nobody is asked.")
+        ui.label(
+            "Where others reach this service, each needs a key or a password; on this computer alone nobody "
+            "is asked."
+        )
         with ui.row().classes("choices"):
             self._name = ui.input("Name of the key")
-            self._role = ui.select(
-                {role: f"{role}: {MAY[role]}" for role in get_args(Role)}, value="viewer", label="Role"
-            ).classes("choice")
-            self._subjects = ui.select(subjects, multiple=True, label="Of whom (nobody: of everybody)")
-            self._subjects.classes("choice")
+            self._scope = ScopeChoice(subjects)
         with ui.element("div").classes("page-acts"):
             main_act("Make a key", self._make)
         self._told = ui.label().props('aria-live="polite"')
         self._made = ui.input("The key; it is not shown again").props("readonly").classes("choice")
         self._made.set_visibility(False)
         self._keys = ui.element("div")
+        self._people = PeopleTable(self._service, subjects, self._look)
         heading(2, "Changes")
         with ui.element("div").classes("page-acts"):
             act("Look whether the log is what was written", self._check)
@@ -70,6 +63,7 @@ class AccessPage:
     async def _look(self) -> None:
         keys = await self._service.read(list[Key], "/keys")
         changes = await self._service.read(list[AuditRow], "/audit", limit=SHOWN)
+        await self._people.look()
         self._keys.clear()
         with self._keys:
             if not keys:
@@ -91,7 +85,7 @@ class AccessPage:
         with ui.element("tr"):
             row_head(key.name)
             cell(key.role)
-            cell("everybody" if key.subjects is None else ", ".join(key.subjects))
+            cell(whose(key))
             cell(moment(key.created_at))
             with ui.element("td"):
                 if key.revoked_at is None:
@@ -100,7 +94,7 @@ class AccessPage:
                     ui.label(f"revoked {moment(key.revoked_at)}")
 
     async def _make(self) -> None:
-        body = {"name": self._name.value, "role": self._role.value, "subjects": self._subjects.value or None}
+        body = {"name": self._name.value, **self._scope.body}
         with refusals(self._told.set_text):
             made = read(NewKey, await self._service.post("/keys", body))
             self._made.set_value(made.key)
