@@ -15,9 +15,9 @@ from glovecal_models.errors import BadInput
 
 LEAST_CHARACTERS = 12
 MOST_CHARACTERS = 200
-_PASSES, _LANES, _KIB = 3, 4, 64 * 1024
+_PASSES, _PARALLELISM, _KIB = 3, 4, 64 * 1024
 _SALT_BYTES, _HASH_BYTES = 16, 32
-NOBODYS = f"$argon2id$v=19$m={_KIB},t={_PASSES},p={_LANES}${'A' * 22}${'A' * 43}"
+NOBODYS = f"$argon2id$v=19$m={_KIB},t={_PASSES},p={_PARALLELISM}${'A' * 22}${'A' * 43}"
 """A hash of no known password, for names that there are not: to check it takes as long."""
 
 
@@ -35,7 +35,7 @@ def check_password(password: str, name: str) -> None:
 def password_hash(password: str) -> str:
     """In PHC format, which has its parameters in it."""
     salt = secrets.token_bytes(_SALT_BYTES)
-    made = Argon2id(salt=salt, length=_HASH_BYTES, iterations=_PASSES, lanes=_LANES, memory_cost=_KIB)
+    made = Argon2id(salt=salt, length=_HASH_BYTES, iterations=_PASSES, lanes=_PARALLELISM, memory_cost=_KIB)
     return made.derive_phc_encoded(_bytes(password))
 
 

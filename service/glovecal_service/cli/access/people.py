@@ -50,7 +50,7 @@ def list_people(as_json: AsJson = False) -> None:
     columns = {
         "name": "person",
         **SCOPE_COLUMNS,
-        "password_changed_at": "password of",
+        "password_changed_at": "password set",
         "revoked_at": "removed",
     }
     empty = "Nobody yet. Add somebody: glovecal person add NAME --role operator"

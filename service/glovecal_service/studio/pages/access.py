@@ -26,7 +26,7 @@ def add(studio: Studio) -> None:
 
     @page("/access")
     async def access() -> None:
-        async with shell(studio, "access", "Keys and changes"):
+        async with shell(studio, "access", "Keys, people and changes"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             with refusals(warn_long):
                 await AccessPage(studio).build()

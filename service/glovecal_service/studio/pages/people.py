@@ -62,10 +62,13 @@ class PeopleTable:
             main_act("Add the person", self._add)
         self._message = ui.label().props('aria-live="polite"')
         self._rows = ui.element("div")
-        with ui.dialog().props('aria-label="Change a person"') as self._dialog, ui.card():
+        with (
+            ui.dialog().props('aria-label="Change a person"') as self._dialog,
+            ui.card().classes("person-change"),
+        ):
             self._whom = heading(2, "")
             self._new_scope = ScopeChoice(subjects)
-            self._new_password = _password_input("New password (empty: as it is)")
+            self._new_password = _password_input("New password (empty: no change)")
             with ui.row():
                 act("Change", self._change)
                 act("Cancel", self._dialog.close)
@@ -78,7 +81,7 @@ class PeopleTable:
             if not people:
                 ui.label("Nobody yet.")
                 return
-            with table("People", ("Person", "Role", "Of", "Password of", "")):
+            with table("People", ("Person", "Role", "Of", "Password set", "")):
                 for person in people:
                     self._row(person)
 
@@ -106,8 +109,9 @@ class PeopleTable:
         body = {"name": self._name.value, "password": self._password.value, **self._scope.body}
         with refusals(self._message.set_text):
             await self._service.post("/people", body)
-            self._password.set_value("")
             self._message.set_text(f"{self._name.value} is added, and may log in.")
+            self._name.set_value("")
+            self._password.set_value("")
             await self._changed()
 
     async def _change(self) -> None:

@@ -60,7 +60,7 @@ class StartPage:
                 ui.link("Takes", "/takes").classes("studio-link")
             with _section("access", "Let others in"):
                 ui.label("Others who reach this service need a key; who changed what is written down.")
-                ui.link("Keys and changes", "/access").classes("studio-link")
+                ui.link("Keys, people and changes", "/access").classes("studio-link")
         await self._look()
         ui.timer(EVERY_S, self._look)
 
