@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import pytest
@@ -116,18 +117,32 @@ def test_a_name_that_is_not_there_costs_as_much_as_a_wrong_password(
     for name in ("anna", "gone", "nobody"):
         assert sqlite_store.people.of(name, "wrong wrong wrong") is None
     assert sqlite_store.people.of("gone", PASSWORD) is None
-    assert checked == ["$argon2id$v=19$m=65536,t=3,p=4"] * 4
+    assert checked == ["$argon2id$v=19$m=65536,t=3,p=1"] * 4
 
 
 def test_passwords_are_hashed_slowly_with_salt_and_read_as_any_keyboard_writes_them() -> None:
     one, other = password_hash("pässword-long"), password_hash("pässword-long")
     assert one != other
-    assert one.startswith("$argon2id$v=19$m=65536,t=3,p=4$")
+    assert one.startswith("$argon2id$v=19$m=65536,t=3,p=1$")
     assert is_password("pässword-long", one), "decomposed"
     assert not is_password("passw\u006frd-long", one)
     began = time.process_time()
     assert not is_password("any", NOBODYS)
     assert time.process_time() - began > 0.02, "of the processor, in seconds: guessing is dear"
+
+
+def test_several_passwords_are_checked_at_once() -> None:
+    """With more than one lane, OpenSSL's threads wait for each other for ever."""
+    hashed, answers = password_hash(PASSWORD), []
+    checks = [
+        threading.Thread(target=lambda: answers.append(is_password(PASSWORD, hashed)), daemon=True)
+        for _ in range(4)
+    ]
+    for check in checks:
+        check.start()
+    for check in checks:
+        check.join(timeout=60.0)
+    assert answers == [True] * 4
 
 
 def test_keys_of_the_schema_before_people_still_open(store_settings: Settings) -> None:

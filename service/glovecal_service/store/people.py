@@ -22,7 +22,7 @@ class People(Principals):
     def create(
         self, name: str, role: Role, subjects: Sequence[str] | None = None, *, password: str
     ) -> Principal:
-        """Takes some 0.3 s of a processor, as every check of a password does. Raises BadInput, NotFound for a
+        """Takes some 0.2 s of a processor, as every check of a password does. Raises BadInput, NotFound for a
         subject, and Conflict for a name that was ever used."""
         check_password(password, name)
         proof = {"password": password_hash(password), "password_changed_at": now()}

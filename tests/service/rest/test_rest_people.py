@@ -193,7 +193,7 @@ def in_a_loop(work: Callable[[], object]) -> None:
     anyio.run(work)  # type: ignore[arg-type]
 
 
-def test_strangers_lock_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_strangers_lock_nobody_out() -> None:
     async def work() -> None:
         at_s = 0.0
         limit = Guesses(lambda: at_s)
@@ -244,6 +244,7 @@ def test_passwords_are_checked_a_few_at_once_while_the_service_answers_others() 
         limit = Guesses(lambda: 0.0)
         go_on, running, most = threading.Event(), [], []
         answers: list[object] = []
+        refused: list[object] = []
 
         def check() -> str:
             running.append(1)
@@ -263,7 +264,7 @@ def test_passwords_are_checked_a_few_at_once_while_the_service_answers_others() 
                 group.start_soon(one, number)
             for _ in range(100):  # all of them are asked before the first is checked
                 await anyio.lowlevel.checkpoint()
-            refused = list(answers)
+            refused += answers
             go_on.set()
         assert refused == [503] * (30 - guesses.CHECKED_AT_ONCE - guesses.MOST_WAITING)
         assert answers.count("right") == guesses.CHECKED_AT_ONCE + guesses.MOST_WAITING
