@@ -29,7 +29,8 @@ SAMPLES = {
     "glove": "right", "hand": "left", "GLOVE": "right", "LENGTH": "190", "seed": "1", "file": "FILE",
     "named": "--take 0123456789ab", "field": "0123456789ab", "effect": "hysteresis",
     "table": "FILE", "layout": "cyberglove18", "TAKE": "0123456789ab", "DEVICE": "simulated",
-    "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "device": "lucidglove:/dev/ttyUSB0",
+    "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "needed": "trainer",
+    "device": "lucidglove:/dev/ttyUSB0",
 }  # fmt: skip
 
 
