@@ -9,6 +9,8 @@
     │   ├── DeviceLost      the device was there and is gone (unplugged); open it again
     │   └── DeviceFinished  the device has no more to give (the end of a replayed file)
     ├── DamagedLog          a recording cannot be read at all (a damaged tail is repaired instead)
+    ├── DamagedFile         an encrypted file was changed, or cut at its end (also an OSError)
+    ├── BadEncryptionKey    the key of encrypted files cannot be used, or is another's (also an OSError)
     ├── CaptureRefused      capture must not start (another publisher has the glove)
     ├── NoAnswer            nobody answered a query; the sentence says what was asked
     │   ├── NotAdmitted     a site does not let this computer in; the sentence says why
@@ -62,6 +64,14 @@ class DeviceFinished(DeviceError):
 
 class DamagedLog(ClientError):
     """A recording cannot be read at all; a damaged tail alone is cut off instead."""
+
+
+class DamagedFile(ClientError, OSError):
+    """An encrypted file is not as it was written from some place on; what comes before it is."""
+
+
+class BadEncryptionKey(ClientError, OSError):
+    """The key of encrypted files is missing, unusable, or not the one they were encrypted with."""
 
 
 class CaptureRefused(ClientError):

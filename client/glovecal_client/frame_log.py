@@ -16,12 +16,19 @@ import threading
 import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from io import FileIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from glovecal_client.errors import DamagedLog, reason_of
+from glovecal_client.encryption.kept_file import (
+    GrowingFile,
+    create_growing,
+    cut_file,
+    open_kept,
+    resume_growing,
+)
+from glovecal_client.errors import DamagedFile, DamagedLog, reason_of
 from glovecal_client.operating_system import move_over, remove, sync_file
 from glovecal_client.private_files import open_private
 from glovecal_client.wire.frame import Frame, decode_frame
@@ -49,6 +56,13 @@ def record_bytes(payload: bytes) -> bytes:
 
 def read_header(file: BinaryIO, name: str) -> tuple[dict[str, Any], int]:
     """The meta and the offset of the first record. Raises DamagedLog."""
+    try:
+        return _read_header(file, name)
+    except DamagedFile as error:
+        raise DamagedLog(str(error)) from error
+
+
+def _read_header(file: BinaryIO, name: str) -> tuple[dict[str, Any], int]:
     file.seek(0)
     start = file.read(len(MAGIC) + _PAIR.size)
     if len(start) < len(MAGIC) + _PAIR.size or not start.startswith(MAGIC):
@@ -72,20 +86,28 @@ def scan_records(file: BinaryIO, offset: int) -> Iterator[tuple[int, bytes]]:
     A length of 0 counts as bad: a power cut can leave zeros, and zero bytes have CRC 0.
     """
     file.seek(offset)
-    while len(pair := file.read(_PAIR.size)) == _PAIR.size:
-        length, crc = _PAIR.unpack(pair)
-        if not 1 <= length <= MAX_RECORD_BYTES:
-            return
-        payload = file.read(length)
-        if len(payload) != length or zlib.crc32(payload) != crc:
-            return
-        offset += _PAIR.size + length
-        yield offset, payload
+    with suppress(DamagedFile):
+        while len(pair := file.read(_PAIR.size)) == _PAIR.size:
+            length, crc = _PAIR.unpack(pair)
+            if not 1 <= length <= MAX_RECORD_BYTES:
+                return
+            payload = file.read(length)
+            if len(payload) != length or zlib.crc32(payload) != crc:
+                return
+            offset += _PAIR.size + length
+            yield offset, payload
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        return open_kept(path)
+    except DamagedFile as error:
+        raise DamagedLog(str(error)) from error
 
 
 def good_end(path: Path) -> tuple[dict[str, Any], int, int]:
     """The meta, the number of good records and where they end. Raises DamagedLog for a bad header."""
-    with path.open("rb") as file:
+    with _open(path) as file:
         meta, end = read_header(file, path.name)
         records = 0
         for after, _ in scan_records(file, end):
@@ -100,14 +122,7 @@ def cut_damaged_tail(path: Path) -> int:
     They are kept beside it in ``NAME.cut``: a recording is never thrown away. Raises DamagedLog, OSError.
     """
     _, _, end = good_end(path)
-    with path.open("r+b") as file:
-        file.seek(end)
-        tail = file.read()
-        if tail:
-            with path.with_name(path.name + ".cut").open("ab") as kept:
-                kept.write(tail)
-            file.truncate(end)
-    return len(tail)
+    return cut_file(path, end)
 
 
 @dataclass(frozen=True)
@@ -122,19 +137,19 @@ class Recording:
     def open(cls, path: Path | str) -> Recording:
         """Raises DamagedLog if the header is not that of a log, OSError if it cannot be read."""
         path = Path(path)
-        with path.open("rb") as file:
+        with _open(path) as file:
             meta, first = read_header(file, path.name)
         return cls(path, meta, first)
 
     def payloads(self) -> Iterator[bytes]:
         """The records' payloads in the order they were written."""
-        with self.path.open("rb") as file:
+        with open_kept(self.path) as file:
             for _, payload in scan_records(file, self.first_record):
                 yield payload
 
     def places(self) -> Iterator[tuple[int, bytes]]:
         """Where in the file each payload begins, and the payload."""
-        with self.path.open("rb") as file:
+        with open_kept(self.path) as file:
             for end, payload in scan_records(file, self.first_record):
                 yield end - len(payload), payload
 
@@ -150,7 +165,7 @@ MAX_WAITING = 7200
 class FrameLog:
     """One log file open for appending. ``append`` is for one thread; ``sync`` may run in another."""
 
-    def __init__(self, path: Path, file: FileIO, meta: dict[str, Any], records: int, end: int) -> None:
+    def __init__(self, path: Path, file: GrowingFile, meta: dict[str, Any], records: int, end: int) -> None:
         self.path = path
         self.meta = meta
         self.records: int = records
@@ -177,7 +192,7 @@ class FrameLog:
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
         unnamed = path.with_name(f"{path.name}.new")
         try:
-            with FileIO(unnamed, "wb", opener=open_private) as file:
+            with create_growing(unnamed, "wb", open_private) as file:
                 if file.write(head) != len(head):
                     raise OSError(errno.ENOSPC, f"{path}: no room for the header")
                 sync_file(file)
@@ -185,9 +200,7 @@ class FrameLog:
         except OSError:
             remove(unnamed)
             raise
-        file = FileIO(path, "r+b")
-        file.seek(len(head))
-        return cls(path, file, dict(meta), 0, len(head))
+        return cls(path, resume_growing(path, len(head)), dict(meta), 0, len(head))
 
     @classmethod
     def resume(cls, path: Path | str) -> FrameLog:
@@ -195,9 +208,7 @@ class FrameLog:
         path = Path(path)
         cut_damaged_tail(path)
         meta, records, end = good_end(path)
-        file = FileIO(path, "r+b")
-        file.seek(end)
-        return cls(path, file, meta, records, end)
+        return cls(path, resume_growing(path, end), meta, records, end)
 
     @property
     def waiting(self) -> int:

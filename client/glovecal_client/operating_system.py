@@ -30,6 +30,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from io import RawIOBase
 from pathlib import Path
 from typing import IO, Any
 
@@ -64,7 +65,7 @@ def lock_file(file: IO[Any]) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def sync_file(file: IO[Any]) -> None:
+def sync_file(file: IO[Any] | RawIOBase) -> None:
     """Bring an open file to the disk, so that a power cut leaves it whole. Raises OSError."""
     os.fsync(file.fileno())
     if sys.platform == "darwin":

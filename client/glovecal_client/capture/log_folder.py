@@ -18,7 +18,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.errors import BadName, CaptureRefused, DamagedLog, reason_of
+from glovecal_client.encryption.kept_file import open_kept
+from glovecal_client.encryption.key_file import settle_encryption
+from glovecal_client.errors import BadEncryptionKey, BadName, CaptureRefused, DamagedLog, reason_of
 from glovecal_client.frame_log import FrameLog, Recording, cut_damaged_tail, scan_records
 from glovecal_client.keys import GloveKeys
 from glovecal_client.operating_system import lock_file
@@ -33,13 +35,17 @@ class LogFolder:
     """The folder, held by one daemon at a time (the lock goes with the process, also on kill -9)."""
 
     def __init__(self, data: Path, keys: GloveKeys) -> None:
-        """Create the folder if needed and lock it. Raises CaptureRefused."""
+        """Create the folder if needed and lock it. Raises CaptureRefused, BadEncryptionKey."""
         self.path: Path = data / "capture" / keys.site / keys.glove
         try:
+            data.mkdir(parents=True, exist_ok=True)
+            settle_encryption(data)
             self.path.mkdir(parents=True, exist_ok=True)
             with suppress(PermissionError):  # a file system without permissions takes recordings all the same
                 make_private(data / "capture")
             self._lock = (self.path / "lock").open("ab")
+        except BadEncryptionKey:
+            raise
         except OSError as error:
             raise CaptureRefused(
                 f"capture of glove {keys.glove!r}: cannot write in {self.path}: {reason_of(error)}"
@@ -140,7 +146,7 @@ class LogIndex:
 
     def extend(self) -> None:
         """Take in the records written since the last call. Raises OSError."""
-        with self._lock, self._recording.path.open("rb") as file:
+        with self._lock, open_kept(self._recording.path) as file:
             start = self._end
             for end, payload in scan_records(file, self._end):
                 self._add(frame_sequence(payload), start)
@@ -163,7 +169,7 @@ class LogIndex:
             offset = self._offsets[entry] if entry >= 0 else self._recording.first_record
         found: list[bytes] = []
         total = 0
-        with self._recording.path.open("rb") as file:
+        with open_kept(self._recording.path) as file:
             for _, payload in scan_records(file, offset):
                 sequence = frame_sequence(payload)
                 total += len(payload) if sequence >= first else 0

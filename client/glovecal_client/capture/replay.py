@@ -19,6 +19,7 @@ import numpy as np
 
 from glovecal_client.capture.device import Reading, check_options
 from glovecal_client.clock import clock_ns, clock_s, wall_ns
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import BadName, BadOption, DamagedLog, DeviceFinished, WireError, reason_of
 from glovecal_client.frame_log import MAGIC, Recording
 from glovecal_client.keys import check_channel_name, check_identifier
@@ -56,7 +57,7 @@ class ReplayedFrames(Protocol):
 def open_recording(path: Path) -> ReplayedFrames:
     """The recording in ``path``. Raises BadOption naming the file and what is wrong with it."""
     try:
-        with path.open("rb") as file:
+        with open_kept(path) as file:
             is_log = file.read(len(MAGIC)) == MAGIC
         return _FrameLogRecording(path) if is_log else _TableRecording(path)
     except (OSError, DamagedLog, BadName) as error:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import WireError
 from glovecal_client.frame_log import FrameLog, Recording
 from glovecal_client.gap_repair import as_logged
@@ -286,7 +287,7 @@ class RecordedFrames:
     def messages(self, rows: slice | Sequence[int]) -> list[bytes]:
         """As they lie in the capture log, if they are from there. Raises OSError."""
         messages = []
-        with self._path.open("rb") as file:
+        with open_kept(self._path) as file:
             for place, length in zip(self._places[rows].tolist(), self._lengths[rows].tolist(), strict=True):
                 file.seek(place)
                 messages.append(as_logged(file.read(length)))

@@ -1,0 +1,145 @@
+"""Files that show or measure a person: encrypted while ``GLOVECAL_ENCRYPTION_KEY_FILE`` names a key.
+
+Whoever reads or writes such a file does it here and need not know which it is: a file that was written
+without a key stays readable when there is one.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from io import FileIO
+from pathlib import Path
+from typing import IO, BinaryIO, Literal, cast
+
+from glovecal_client.encryption.encrypted_file import (
+    GROWING,
+    HEADER_BYTES,
+    SLOT_BYTES,
+    WHOLE,
+    DecryptingReader,
+    EncryptingWriter,
+    is_encrypted,
+)
+from glovecal_client.encryption.key_file import key_of_environment
+from glovecal_client.operating_system import sync_file
+
+GrowingFile = FileIO | EncryptingWriter
+"""Written without a buffer; what was written is with the operating system."""
+Opener = Callable[[str, int], int]
+
+
+def is_kept_encrypted(path: Path) -> bool:
+    """For libraries that read a path. Raises OSError, BadEncryptionKey."""
+    with path.open("rb") as file:
+        return is_encrypted(file.read(HEADER_BYTES), key_of_environment())
+
+
+def open_kept(path: Path) -> BinaryIO:
+    """Read a file. Raises OSError; of these BadEncryptionKey, and DamagedFile, which reading raises too."""
+    file = FileIO(path, "rb")
+    try:
+        key = key_of_environment()
+        if not is_encrypted(file.read(HEADER_BYTES), key):
+            file.seek(0)
+            return io.BufferedReader(file)
+        reader = DecryptingReader(file, key, path.name)
+        return cast("BinaryIO", io.BufferedReader(reader, SLOT_BYTES))
+    except BaseException:
+        file.close()
+        raise
+
+
+def open_kept_text(path: Path) -> IO[str]:
+    """As ``open_kept``, UTF-8 with lines as they are."""
+    return io.TextIOWrapper(open_kept(path), encoding="utf-8", newline="")
+
+
+def read_kept(path: Path) -> bytes:
+    """All of a file. Raises as ``open_kept``."""
+    with open_kept(path) as file:
+        return file.read()
+
+
+def create_whole(path: Path) -> BinaryIO:
+    """A new file, written once: who reads it later is told where its end is missing. Raises FileExistsError,
+    OSError, BadEncryptionKey."""
+    key = key_of_environment()
+    if key is None:
+        return path.open("xb")
+    return cast(
+        "BinaryIO", _created(FileIO(path, "xb"), lambda file: EncryptingWriter.create(file, key, WHOLE))
+    )
+
+
+def finish_file(file: BinaryIO) -> None:
+    """Write the end of a file of ``create_whole`` and bring all to the disk. Raises OSError."""
+    if isinstance(file, EncryptingWriter):
+        file.finish()
+    file.flush()
+    sync_file(file)
+
+
+def create_growing(path: Path, mode: Literal["xb", "wb"] = "xb", opener: Opener | None = None) -> GrowingFile:
+    """A new file that is readable up to its last write, whatever ends the writer. Raises FileExistsError,
+    OSError, BadEncryptionKey."""
+    key = key_of_environment()
+    file = FileIO(path, mode, opener=opener)
+    return file if key is None else _created(file, lambda file: EncryptingWriter.create(file, key, GROWING))
+
+
+def resume_growing(path: Path, end: int) -> GrowingFile:
+    """Go on after ``end`` bytes of its content. Raises OSError, DamagedFile, BadEncryptionKey."""
+    key = key_of_environment()
+    file = FileIO(path, "r+b")
+    if not is_encrypted(file.read(HEADER_BYTES), key):
+        file.seek(end)
+        return file
+    return _created(file, lambda file: EncryptingWriter.resume(file, key, path.name))
+
+
+def _created(file: FileIO, make: Callable[[FileIO], EncryptingWriter]) -> EncryptingWriter:
+    try:
+        return make(file)
+    except BaseException:
+        file.close()
+        raise
+
+
+def cut_file(path: Path, end: int) -> int:
+    """Cut a growing file back to ``end`` bytes of its content, where a write ended; how many bytes went.
+
+    They are kept as they lay, encrypted or not, in ``NAME.cut``. Raises OSError, DamagedFile,
+    BadEncryptionKey.
+    """
+    key = key_of_environment()
+    with path.open("r+b") as file:
+        if is_encrypted(file.read(HEADER_BYTES), key):
+            end = DecryptingReader(file, key, path.name, closes=False).boundary(end)
+        file.seek(end)
+        tail = file.read()
+        if tail:
+            with path.with_name(path.name + ".cut").open("ab") as kept:
+                kept.write(tail)
+            file.truncate(end)
+    return len(tail)
+
+
+def encrypted(content: bytes) -> bytes:
+    """What is to be written for ``content``. Raises BadEncryptionKey."""
+    key = key_of_environment()
+    if key is None:
+        return content
+    held = io.BytesIO()
+    with EncryptingWriter.create(held, key, WHOLE) as file:
+        file.write(content)
+        file.finish()
+        return held.getvalue()
+
+
+def decrypted(content: bytes, name: str) -> bytes:
+    """Inverse of ``encrypted``; the same where it is not. Raises DamagedFile, BadEncryptionKey."""
+    key = key_of_environment()
+    if not is_encrypted(content[:HEADER_BYTES], key):
+        return content
+    return DecryptingReader(io.BytesIO(content), key, name).readall()

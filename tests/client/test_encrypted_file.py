@@ -1,0 +1,306 @@
+"""Encrypted files: what is read is what was written, or a refusal, whatever was done to the bytes."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from encryption_support import use_new_key
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
+from glovecal_client.encryption.encrypted_file import (
+    GROWING,
+    HEADER_BYTES,
+    OVERHEAD_BYTES,
+    SLOT_BYTES,
+    WHOLE,
+    DecryptingReader,
+    EncryptingWriter,
+    is_encrypted,
+)
+from glovecal_client.encryption.kept_file import (
+    create_growing,
+    create_whole,
+    decrypted,
+    encrypted,
+    finish_file,
+    open_kept,
+    read_kept,
+    resume_growing,
+)
+from glovecal_client.encryption.key_file import EncryptionKey
+from glovecal_client.errors import BadEncryptionKey, DamagedFile
+from glovecal_client.frame_log import cut_damaged_tail
+
+KEY, OTHER_KEY = (EncryptionKey(Path(name), name.encode() * 8) for name in ("here", "away"))
+WRITES = st.lists(
+    st.integers(0, 300) | st.integers(SLOT_BYTES - 80, SLOT_BYTES + 80) | st.integers(0, 4 * SLOT_BYTES),
+    max_size=5,
+)
+"""Sizes of writes, some about as long as a slot."""
+KINDS = st.sampled_from([WHOLE, GROWING])
+
+
+def written(kind: bytes, sizes: list[int], seed: int = 0) -> tuple[bytes, bytes]:
+    """Content and file."""
+    content = np.random.default_rng(seed).bytes(sum(sizes))
+    held, begins = io.BytesIO(), 0
+    with EncryptingWriter.create(held, KEY, kind) as file:
+        for size in sizes:
+            assert file.write(content[begins : begins + size]) == size
+            begins += size
+        file.finish()
+        return content, held.getvalue()
+
+
+def read(sealed: bytes, key: EncryptionKey = KEY) -> DecryptingReader:
+    return DecryptingReader(io.BytesIO(sealed), key, "FILE")
+
+
+def read_up_to_damage(sealed: bytes) -> tuple[bytes, bool]:
+    """What can be read from the start, and whether it ends with a refusal."""
+    got = bytearray()
+    try:
+        reader = read(sealed)
+        while part := reader.read(1000):
+            got += part
+    except (DamagedFile, BadEncryptionKey):
+        return bytes(got), True
+    return bytes(got), False
+
+
+@settings(max_examples=60, deadline=None)
+@given(kind=KINDS, sizes=WRITES, data=st.data())
+def test_any_content_is_read_at_any_place(kind: bytes, sizes: list[int], data: st.DataObject) -> None:
+    content, sealed = written(kind, sizes)
+    reader = read(sealed)
+    assert reader.seek(0, io.SEEK_END) == len(content)
+    assert reader.read(1) == b""
+    for _ in range(5):
+        at, size = data.draw(st.integers(0, len(content) + 9)), data.draw(st.integers(0, 2 * SLOT_BYTES))
+        reader.seek(at)
+        assert io.BufferedReader(reader).read(size) == content[at : at + size] if size else True
+        reader = read(sealed)
+    assert read(sealed).readall() == content
+
+
+@settings(max_examples=150, deadline=None)
+@given(kind=KINDS, sizes=WRITES, data=st.data())
+def test_a_cut_gives_the_content_before_it_and_of_a_whole_file_nothing(
+    kind: bytes, sizes: list[int], data: st.DataObject
+) -> None:
+    content, sealed = written(kind, sizes)
+    near = [SLOT_BYTES * slot + HEADER_BYTES for slot in range(len(sealed) // SLOT_BYTES + 1)]
+    at = data.draw(st.integers(0, len(sealed) - 1) | st.sampled_from(near))
+    if at >= len(sealed):
+        return
+    got, is_refused = read_up_to_damage(sealed[:at])
+    assert content.startswith(got)
+    if kind == WHOLE:
+        assert (got, is_refused) == (b"", True)
+    assert is_encrypted(sealed[:at][:HEADER_BYTES], KEY)
+
+
+@settings(max_examples=300, deadline=None)
+@given(kind=KINDS, sizes=WRITES, data=st.data())
+def test_a_flipped_bit_gives_no_wrong_content(kind: bytes, sizes: list[int], data: st.DataObject) -> None:
+    content, sealed = written(kind, sizes)
+    damaged = bytearray(sealed)
+    ahead = st.integers(0, min(len(sealed), 200) - 1)
+    damaged[data.draw(st.integers(0, len(sealed) - 1) | ahead)] ^= 1 << data.draw(st.integers(0, 7))
+    got, is_refused = read_up_to_damage(bytes(damaged))
+    assert content.startswith(got)
+    assert is_refused or got == content  # zeros between blocks are nobody's content
+    assert is_encrypted(bytes(damaged[:HEADER_BYTES]), KEY)
+
+
+@settings(max_examples=200, deadline=None)
+@given(kind=KINDS, sizes=st.lists(st.sampled_from([40, SLOT_BYTES]), min_size=2, max_size=6), data=st.data())
+def test_blocks_that_change_places_give_no_wrong_content(
+    kind: bytes, sizes: list[int], data: st.DataObject
+) -> None:
+    """Within the file, from another file of the same shape, and from an earlier state of the same place."""
+    content, sealed = written(kind, sizes)
+    other_content, other = written(kind, sizes, seed=1)
+    assert content != other_content
+    size = data.draw(st.sampled_from([40 + OVERHEAD_BYTES, SLOT_BYTES]))
+    starts = list(range(HEADER_BYTES, len(sealed) - size + 1, size)) or [HEADER_BYTES]
+    starts += [at + 8 for at in starts]
+    one, two = data.draw(st.sampled_from(starts)), data.draw(st.sampled_from(starts))
+    moved = bytearray(sealed)
+    moved[one : one + size] = data.draw(st.sampled_from([sealed, other]))[two : two + size]
+    got, is_refused = read_up_to_damage(bytes(moved))
+    assert content.startswith(got)
+    assert is_refused or got == content
+
+
+@pytest.mark.parametrize("kind", [WHOLE, GROWING])
+def test_another_key_is_named_and_nothing_is_read(kind: bytes) -> None:
+    _, sealed = written(kind, [100])
+    with pytest.raises(
+        BadEncryptionKey, match=f"key {KEY.id.hex()[:8]}, and away holds .*name the right file"
+    ):
+        read(sealed, OTHER_KEY)
+
+
+def test_files_are_as_they_were_without_the_setting(tmp_path: Path) -> None:
+    with create_whole(tmp_path / "whole") as file:
+        file.write(b"content")
+        finish_file(file)
+    with create_growing(tmp_path / "growing") as file:
+        file.write(b"content")
+    assert encrypted(b"content") == (tmp_path / "whole").read_bytes() == b"content"
+    assert (tmp_path / "growing").read_bytes() == b"content"
+    assert decrypted(b"content", "name") == read_kept(tmp_path / "whole") == b"content"
+
+
+def test_what_was_written_before_the_setting_stays_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "old").write_bytes(b"old")
+    use_new_key(tmp_path, monkeypatch)
+    assert read_kept(tmp_path / "old") == b"old"
+    with resume_growing(tmp_path / "old", 3) as file:
+        file.write(b"er")
+    assert read_kept(tmp_path / "old") == decrypted(b"older", "name") == b"older"
+
+
+def test_a_whole_file_whose_writer_failed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    use_new_key(tmp_path, monkeypatch)
+
+    def fail() -> None:
+        with create_whole(tmp_path / "file") as file:
+            file.write(bytes(3 << 20))
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    with pytest.raises(DamagedFile, match="its end is missing"):
+        open_kept(tmp_path / "file")
+
+
+# The frame log, encrypted.
+
+META = {"glove": "g1", "sensors": ["A", "B"]}
+MESSAGES = [encode_frame(Frame(i, 7, i, i, np.array([i, -i], np.float32))) for i in range(5)]
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    use_new_key(tmp_path, monkeypatch)
+    log = FrameLog.create(tmp_path / "whole", META)
+    for message in MESSAGES:
+        assert log.append(message)
+    log.close()
+    return tmp_path / "whole"
+
+
+def record_starts(content: bytes) -> list[int]:
+    """Where each block starts that holds a record, and the end of the last."""
+    at, starts = HEADER_BYTES + 8, []
+    while at < len(content):
+        at += OVERHEAD_BYTES + int.from_bytes(content[at : at + 4], "little")
+        starts.append(at)
+    return starts
+
+
+def test_an_encrypted_log_shows_nothing_and_holds_all(log: Path) -> None:
+    content = log.read_bytes()
+    for known in (b"GLVLOG1", b"sensors", b"g1", MESSAGES[0][:4], MESSAGES[2]):
+        assert known not in content
+    recording = Recording.open(log)
+    assert recording.meta == META
+    assert list(recording.payloads()) == MESSAGES
+    with open_kept(log) as file:
+        for place, payload in recording.places():
+            file.seek(place)
+            assert file.read(len(payload)) == payload
+
+
+def test_an_encrypted_log_cut_at_every_byte_keeps_every_whole_record(log: Path) -> None:
+    content = log.read_bytes()
+    starts = record_starts(content)
+    assert len(starts) == 1 + len(MESSAGES)
+    path = log.with_name("cut")
+    for length in range(len(content)):
+        path.write_bytes(content[:length])
+        if length < starts[0]:
+            with pytest.raises(DamagedLog, match="cut"):
+                FrameLog.resume(path)
+            assert path.stat().st_size == length
+            continue
+        whole = sum(start <= length for start in starts) - 1
+        resumed = FrameLog.resume(path)
+        assert resumed.records == whole
+        resumed.append(b"after")
+        resumed.close()
+        assert list(Recording.open(path).payloads()) == [*MESSAGES[:whole], b"after"]
+        assert b"after" not in path.read_bytes()
+
+
+def test_an_encrypted_log_with_any_byte_flipped_keeps_the_records_before_it_and_loses_no_bytes(
+    log: Path,
+) -> None:
+    content = log.read_bytes()
+    starts = record_starts(content)
+    path, kept = log.with_name("flipped"), log.with_name("flipped.cut")
+    for at in range(len(content)):
+        damaged = bytearray(content)
+        damaged[at] ^= 0x41
+        path.write_bytes(damaged)
+        kept.unlink(missing_ok=True)
+        if at < starts[0]:
+            with pytest.raises((DamagedLog, BadEncryptionKey), match="flipped"):
+                FrameLog.resume(path)
+            assert path.read_bytes() == damaged
+            continue
+        whole = sum(start <= at for start in starts) - 1
+        FrameLog.resume(path).close()
+        assert list(Recording.open(path).payloads()) == MESSAGES[:whole]
+        assert path.read_bytes() + kept.read_bytes() == damaged
+
+
+def test_zeros_after_a_power_cut_are_cut_off_an_encrypted_log(log: Path) -> None:
+    content = log.read_bytes()
+    log.write_bytes(content + bytes(4096))
+    assert list(Recording.open(log).payloads()) == MESSAGES
+    assert cut_damaged_tail(log) == 4096
+    assert log.read_bytes() == content
+
+
+def test_a_killed_writer_of_an_encrypted_log_loses_no_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use_new_key(tmp_path, monkeypatch)
+    writer = (
+        "import os, signal, sys; from glovecal_client import FrameLog\n"
+        "log = FrameLog.create(sys.argv[1], {})\n"
+        "for i in range(5000): log.append(b'%d' % i)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    path = tmp_path / "log"
+    assert subprocess.run([sys.executable, "-c", writer, str(path)], check=False).returncode == -9
+    assert [int(payload) for payload in Recording.open(path).payloads()] == list(range(5000))
+
+
+@pytest.mark.parametrize("key", ["none", "another"])
+def test_without_its_key_a_log_is_neither_read_nor_cut(
+    log: Path, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = log.read_bytes()[:-1]
+    log.write_bytes(content)
+    if key == "none":
+        monkeypatch.delenv("GLOVECAL_ENCRYPTION_KEY_FILE")
+    else:
+        use_new_key(tmp_path, monkeypatch, "another.key")
+    for attempt in (FrameLog.resume, Recording.open):
+        with pytest.raises(BadEncryptionKey, match="whole is encrypted with the key"):
+            attempt(log)
+    assert log.read_bytes() == content
+    assert not log.with_name("whole.cut").exists()
