@@ -22,6 +22,7 @@ No other module here asks which system it runs on. The ways of Windows and macOS
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
@@ -30,7 +31,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from io import RawIOBase
+from io import FileIO, RawIOBase
 from pathlib import Path
 from typing import IO, Any
 
@@ -149,6 +150,17 @@ def held_back_ms(port: str) -> int:
                     if winreg.QueryValueEx(found, "PortName")[0].lower() == port.lower():
                         return int(winreg.QueryValueEx(found, "LatencyTimer")[0])
     return 0
+
+
+def named_pipe(path: Path) -> FileIO:
+    """Make a pipe that a program can open by its path to write to, and open its other end, before any writer
+    has come. Raises OSError, also on Windows, whose pipes have no paths."""
+    if sys.platform == "win32":
+        raise OSError(errno.ENOSYS, "Windows has no pipes with paths")
+    os.mkfifo(path, 0o600)
+    end = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # does not wait for a writer
+    os.set_blocking(end, True)
+    return FileIO(end, "rb")
 
 
 def listen_alone(opened: socket.socket) -> None:

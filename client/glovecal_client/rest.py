@@ -21,6 +21,7 @@ from urllib.parse import quote, urlsplit
 
 import numpy as np
 
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.installation import not_installed
 from glovecal_client.operating_system import move_over, sync_file
@@ -290,7 +291,7 @@ class RestClient:
     ) -> dict[str, Any]:
         """``media_type`` None: that of a table, by its name."""
         kind = media_type or (PARQUET if file.suffix.lower() == ".parquet" else CSV)
-        with file.open("rb") as stream:
+        with open_kept(file) as stream:
             return self._json(method, path, params=query, content=stream, headers={"Content-Type": kind})
 
     def _json(self, method: str, path: str, **request: Any) -> Any:

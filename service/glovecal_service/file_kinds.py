@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from glovecal_client.capture.cyberglove3.card import card_layout
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_service.exports.motion_files import formats as motion_files
 from glovecal_service.exports.vendor_calibrations import formats as vendor_calibrations
 
@@ -17,7 +18,7 @@ LOOKED_AT = 65536
 
 def kind_of(path: Path) -> FileKind:
     """A table where nothing else is recognised: whoever reads it says what is wrong."""
-    with path.open("rb") as stream:
+    with open_kept(path) as stream:
         start = stream.read(LOOKED_AT)
     for kind, is_one in _KINDS.items():
         if is_one(start):

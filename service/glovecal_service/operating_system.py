@@ -6,6 +6,7 @@ The rest is in ``glovecal_client.operating_system``, where the facts of locks, s
   of processes (SetPriorityClass) and, within them, priorities of threads (SetThreadPriority). Everybody may
   ask for ABOVE_NORMAL; HIGH would keep the computer's other programs waiting.
 * Stop: a process in a group of its own hears CTRL_BREAK_EVENT alone, and no Ctrl-C of its console.
+* Memory: Linux makes files that have no place on a disk (``memfd_create``).
 * Fork: only the libraries of Linux survive it.
 * Keys: ``termios`` is of POSIX. Windows has ``msvcrt.getwch`` for its console, where a special key is two
   characters, the first NUL or U+00E0.
@@ -25,7 +26,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, BinaryIO
 
 from glovecal_client.clock import clock_s
 
@@ -42,6 +43,19 @@ def children_context():
     if sys.platform == "linux":
         return multiprocessing.get_context("fork")
     return multiprocessing.get_context("spawn")
+
+
+def memory_file() -> BinaryIO | None:
+    """A file without a name that lies in memory alone and goes with its process, also on kill -9; None where
+    the system has none."""
+    if sys.platform == "linux":
+        return os.fdopen(os.memfd_create("glovecal"), "w+b")
+    return None
+
+
+def path_of(file: BinaryIO) -> Path:
+    """By which this process, and others of its user, open a ``memory_file`` as long as it is open here."""
+    return Path(f"/proc/{os.getpid()}/fd/{file.fileno()}")
 
 
 def go_first() -> None:

@@ -38,7 +38,6 @@ class LogFolder:
         """Create the folder if needed and lock it. Raises CaptureRefused, BadEncryptionKey."""
         self.path: Path = data / "capture" / keys.site / keys.glove
         try:
-            data.mkdir(parents=True, exist_ok=True)
             settle_encryption(data)
             self.path.mkdir(parents=True, exist_ok=True)
             with suppress(PermissionError):  # a file system without permissions takes recordings all the same

@@ -377,8 +377,12 @@ class EncryptingWriter(io.RawIOBase):
         return self._place + len(self._waiting)
 
     def seek(self, offset: int, whence: int = 0, /) -> int:
-        """To the end, where it is."""
-        if (offset, whence) not in ((self.tell(), os.SEEK_SET), (0, os.SEEK_CUR), (0, os.SEEK_END)):
+        """To the end of a file that grows, where it is."""
+        if self._cipher.kind == WHOLE or (offset, whence) not in (
+            (self.tell(), os.SEEK_SET),
+            (0, os.SEEK_CUR),
+            (0, os.SEEK_END),
+        ):
             raise io.UnsupportedOperation("an encrypted file is written at its end alone")
         return self.tell()
 

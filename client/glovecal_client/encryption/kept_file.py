@@ -35,6 +35,11 @@ def is_kept_encrypted(path: Path) -> bool:
         return is_encrypted(file.read(HEADER_BYTES), key_of_environment())
 
 
+def is_encrypting() -> bool:
+    """Whether files that are written now are encrypted. Raises BadEncryptionKey."""
+    return key_of_environment() is not None
+
+
 def open_kept(path: Path) -> BinaryIO:
     """Read a file. Raises OSError; of these BadEncryptionKey, and DamagedFile, which reading raises too."""
     file = FileIO(path, "rb")
@@ -55,10 +60,10 @@ def open_kept_text(path: Path) -> IO[str]:
     return io.TextIOWrapper(open_kept(path), encoding="utf-8", newline="")
 
 
-def read_kept(path: Path) -> bytes:
-    """All of a file. Raises as ``open_kept``."""
+def read_kept(path: Path, most: int = -1) -> bytes:
+    """All of a file, or its first ``most`` bytes. Raises as ``open_kept``."""
     with open_kept(path) as file:
-        return file.read()
+        return file.read(most)
 
 
 def create_whole(path: Path) -> BinaryIO:

@@ -20,7 +20,7 @@ from pathlib import Path
 from glovecal_client.errors import BadEncryptionKey, reason_of
 from glovecal_client.installation import not_installed
 from glovecal_client.operating_system import HAS_FILE_MODES, move_over, sync_file
-from glovecal_client.private_files import OTHERS, open_private
+from glovecal_client.private_files import OTHERS, PRIVATE_FOLDER, open_private
 
 KEY_FILE = "GLOVECAL_ENCRYPTION_KEY_FILE"
 """The environment variable with the path of the key's file."""
@@ -123,6 +123,7 @@ def require_cipher() -> None:
 def _remember(place: Path, key: EncryptionKey) -> None:
     unnamed = place.with_name(f"{place.name}.{secrets.token_hex(4)}")
     try:
+        place.parent.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
         with open(unnamed, "x", encoding="ascii", opener=open_private) as stream:
             stream.write(f"{key.id.hex()}\n")
             stream.flush()

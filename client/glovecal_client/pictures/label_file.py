@@ -17,13 +17,13 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from io import FileIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, reason_of
+from glovecal_client.encryption.kept_file import create_growing, open_kept
+from glovecal_client.errors import DamagedFile, DeviceError, DeviceFinished, DeviceLost, reason_of
 from glovecal_client.pictures.source import Picture
 from glovecal_client.private_files import open_private
 
@@ -48,7 +48,7 @@ class LabelWriter:
         if path.suffix != SUFFIX or len(text) > MOST_HEADER_BYTES:
             raise DeviceError(f"label images {path} must end in {SUFFIX}, and their facts be short")
         try:
-            self._file = FileIO(path, "xb", opener=open_private)
+            self._file = create_growing(path, opener=open_private)
         except FileExistsError as error:
             raise DeviceError(f"{path} exists already; name a new file") from error
         self.path: Path = path
@@ -90,14 +90,14 @@ class LabelFilePictures:
         """Raises DeviceLost for a file that is none of these."""
         self.close()
         try:
-            file = self._path.open("rb")
+            file = open_kept(self._path)
         except OSError as error:
             raise DeviceLost(f"{self._path} cannot be read: {reason_of(error)}") from error
         try:
             self.about: dict[str, Any] = _header(file, self._path)
-        except DeviceLost:
+        except (DeviceLost, DamagedFile) as error:
             file.close()
-            raise
+            raise DeviceLost(reason_of(error)) from error
         self._file, self._number = file, 0
         self._size = self.about["height"], self.about["width"]
         self.simulated: bool = self.about.get("simulated") is True
@@ -173,6 +173,13 @@ def _record(file: BinaryIO, pixels: int) -> tuple[int, int, np.ndarray] | str:
 
 
 def _payload(file: BinaryIO) -> bytes | str:
+    try:
+        return _read_payload(file)
+    except DamagedFile:
+        return _DAMAGED
+
+
+def _read_payload(file: BinaryIO) -> bytes | str:
     pair = file.read(_PAIR.size)
     if not pair:
         return _OVER

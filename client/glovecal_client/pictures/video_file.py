@@ -17,7 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_client.errors import DeviceError, DeviceFinished, DeviceLost, reason_of
+from glovecal_client.encryption.kept_file import create_whole, is_encrypting, is_kept_encrypted
+from glovecal_client.errors import BadEncryptionKey, DeviceError, DeviceFinished, DeviceLost, reason_of
+from glovecal_client.pictures.encrypted_video import EncryptedVideo, VideoStream, open_stream
 from glovecal_client.pictures.source import Picture, opencv
 
 SUFFIX = ".mkv"
@@ -43,6 +45,7 @@ class VideoWriter:
         self._rate_hz = rate_hz
         self._cv2 = opencv()
         self._writer: Any = None
+        self._encrypted: EncryptedVideo | None = None
         self._shape: tuple[int, ...] = ()
         self._times = times_path(path).open("x", encoding="utf-8", newline="")
         self._table = csv.writer(self._times)
@@ -55,6 +58,8 @@ class VideoWriter:
             raise DeviceError(f"a picture of {picture.pixels.shape} does not fit a video of {self._shape}")
         assert self._writer is not None
         self._writer.write(picture.pixels)
+        if self._encrypted is not None and self._encrypted.problem:
+            raise DeviceError(f"{self.path}: {self._encrypted.problem}")
         self._table.writerow([self.pictures, picture.monotonic_ns, picture.wall_ns])
         self._times.flush()
         self.pictures += 1
@@ -63,15 +68,23 @@ class VideoWriter:
         if self._writer is not None:
             self._writer.release()
             self._writer = None
+        if self._encrypted is not None:
+            self._encrypted.close()
         self._times.close()
 
     def _begin(self, pixels: np.ndarray) -> None:
         self._shape = pixels.shape
         height, width = pixels.shape[:2]
         code = self._cv2.VideoWriter.fourcc(*"FFV1")
+        target = self.path
+        if is_encrypting():
+            self._encrypted = EncryptedVideo(self.path)
+            target = self._encrypted.pipe
         self._writer = self._cv2.VideoWriter(
-            str(self.path), self._cv2.CAP_FFMPEG, code, self._rate_hz, (width, height)
+            str(target), self._cv2.CAP_FFMPEG, code, self._rate_hz, (width, height)
         )
+        if self._encrypted is not None and self._writer.isOpened():
+            self._encrypted.begin()
         if not self._writer.isOpened():
             raise DeviceError(
                 f"{self.path} cannot be written: this OpenCV has no FFV1, or the folder is missing"
@@ -90,6 +103,7 @@ class VideoFilePictures:
         self.rate_hz = 30.0
         self._cv2 = opencv()
         self._video: Any = None
+        self._stream: VideoStream | None = None
         self._stamps: list[tuple[int, int]] = []
 
     def open(self) -> None:
@@ -100,10 +114,21 @@ class VideoFilePictures:
         if len(self._stamps) > 1:
             span_s = (self._stamps[-1][0] - self._stamps[0][0]) / 1e9
             self.rate_hz: float = (len(self._stamps) - 1) / max(span_s, 1e-3)
-        video = self._cv2.VideoCapture(str(self._path))
+        video = self._opened()
         if not video.isOpened():
             raise DeviceLost(f"{self._path} cannot be read as a video")
         self._video, self._number = video, 0
+
+    def _opened(self) -> Any:
+        try:
+            if not is_kept_encrypted(self._path):
+                return self._cv2.VideoCapture(str(self._path))
+            self._stream = VideoStream(self._path)
+        except BadEncryptionKey:
+            raise
+        except OSError as error:
+            raise DeviceLost(f"{self._path} cannot be read: {reason_of(error)}") from error
+        return open_stream(self._cv2, self._stream)
 
     def read(self) -> Picture:
         if self._video is None:
@@ -124,6 +149,9 @@ class VideoFilePictures:
         video, self._video = self._video, None
         if video is not None:
             video.release()
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.close()
 
 
 def read_times(video: Path) -> list[tuple[int, int]]:
@@ -167,8 +195,9 @@ def write_preview(video: Path, about: dict[str, Any]) -> Path:
     cv2, source = opencv(), VideoFilePictures(video)
     source.open()
     times_s: list[float] = []
+    path.unlink(missing_ok=True)
     try:
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as file:
+        with create_whole(path) as kept, zipfile.ZipFile(kept, "w", zipfile.ZIP_STORED) as file:
             while len(times_s) < MOST_PICTURES:
                 try:
                     picture = source.read()

@@ -19,6 +19,7 @@ import numpy as np
 
 from glovecal_client.capture.status import CaptureStatus
 from glovecal_client.clock import clock_ns, computer_id, wall_ns
+from glovecal_client.encryption.key_file import settle_encryption
 from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
@@ -79,6 +80,7 @@ class CameraTracking:
         self._run_id = secrets.randbits(64)
         self._status = CaptureStatus(self._run_id, wall_ns(), clock_ns())
         self._newest = NewestPicture()
+        settle_encryption(settings.data)
         self._kept = KeptPictures(settings.keep, settings.folder / "kept", settings.glove)
         self._stop = threading.Event()
         self._stage = settings.stage

@@ -13,6 +13,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
+from glovecal_client.encryption.kept_file import encrypted, read_kept
 from glovecal_client.operating_system import remove
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.job_kind import TaskResult
@@ -32,7 +33,7 @@ class FinishedTasks:
         """The result of that key, None if there is none or it is damaged."""
         for path in self.folder.glob(f"{_check(key)}.*.safetensors"):
             with suppress(OSError, SafetensorError, KeyError, ValueError):
-                content = path.read_bytes()
+                content = read_kept(path)
                 if hashlib.sha256(content).hexdigest() == path.name.split(".")[1]:
                     os.utime(path)
                     return _load(content)
@@ -43,7 +44,7 @@ class FinishedTasks:
         """Keep a result. Raises StorageFull."""
         content = save_arrays(result.arrays, {"facts": json.dumps(result.facts, allow_nan=False)})
         digest = hashlib.sha256(content).hexdigest()
-        write_durably(self.folder / f"{_check(key)}.{digest}.safetensors", content)
+        write_durably(self.folder / f"{_check(key)}.{digest}.safetensors", encrypted(content))
 
     def prune(self, kept_bytes: int = KEPT_BYTES) -> None:
         """Delete the results that were not used for longest until the rest fits."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.video_file import read_about, read_times
 from glovecal_models.errors import BadInput
@@ -129,6 +130,6 @@ def _shows(film: Path, video: VideoFacts) -> bool:
 
 def parts_of(path: Path, size: int = 1 << 20) -> Iterator[bytes]:
     """Of a file. Raises OSError."""
-    with path.open("rb") as file:
+    with open_kept(path) as file:
         while part := file.read(size):
             yield part

@@ -21,6 +21,8 @@ from typing import Protocol
 import obstore
 import obstore.store
 
+from glovecal_client.encryption.kept_file import decrypted, encrypted
+from glovecal_client.errors import DamagedFile
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailable
@@ -203,7 +205,8 @@ SHA256_NAME = re.compile(r"[0-9a-f]{64}\Z")
 
 
 class Artifacts:
-    """Immutable files in a folder or an object store."""
+    """Immutable files in a folder or an object store, named by the sha256 of what they hold, encrypted or
+    not."""
 
     def __init__(self, blobs: Blobs) -> None:
         self._blobs = blobs
@@ -216,13 +219,13 @@ class Artifacts:
         A file of that name that is damaged is replaced. Raises StorageFull.
         """
         name = hashlib.sha256(content).hexdigest()
-        if self._blobs.read(name) != content:
-            self._blobs.write(name, content)
+        if self._read(name) != content:
+            self._blobs.write(name, encrypted(content))
         return name
 
     def get(self, sha256: str) -> bytes:
         """The bytes of that name, verified. Raises NotFound, DamagedArtifact."""
-        content = self._blobs.read(check_sha256(sha256))
+        content = self._read(check_sha256(sha256))
         if content is None:
             raise NotFound(
                 f"artifact {sha256} is missing from {self._blobs.place}; restore that file from a backup"
@@ -234,6 +237,14 @@ class Artifacts:
                 f" sha256 {found}; restore that file from a backup"
             )
         return content
+
+    def _read(self, sha256: str) -> bytes | None:
+        """Decrypted; what was changed comes as it lies there, and has another sha256."""
+        content = self._blobs.read(sha256)
+        try:
+            return content if content is None else decrypted(content, f"artifact {sha256}")
+        except DamagedFile:
+            return content
 
     def verify(self, sha256: str) -> None:
         """As ``get``, without reading again what was sound some minutes ago and is not changed since."""

@@ -18,6 +18,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Table, delete, insert, select, update
 
+from glovecal_client.errors import DamagedFile
 from glovecal_models.errors import GlovecalError
 from glovecal_service.operating_system import as_typed
 from glovecal_service.settings import Settings
@@ -28,6 +29,7 @@ from glovecal_service.store.belongings import (
     Belongings,
     artifacts_of,
     films_of,
+    parts_of,
     recording_files,
 )
 from glovecal_service.store.database import grow_revision, new_id, now
@@ -308,8 +310,13 @@ def _sha256(store: Store, settings: Settings, file: dict[str, str]) -> str:
     """ "" for what is not there."""
     if file["place"] == ARTIFACTS:
         return file["name"] if store.artifacts.exists(file["name"]) else ""
-    with (settings.data / file["name"]).open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()
+    digest, place = hashlib.sha256(), settings.data / file["name"]
+    try:
+        for part in parts_of(place):
+            digest.update(part)
+    except DamagedFile:  # goes all the same: as it lies there
+        digest = hashlib.sha256(place.read_bytes())
+    return digest.hexdigest()
 
 
 def _unlink(store: Store, settings: Settings, file: dict[str, str]) -> bool:

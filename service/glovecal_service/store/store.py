@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 
+from glovecal_client.encryption.key_file import KEY_ID_FILE, settle_encryption
 from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
 from glovecal_service.store.actor import NOBODY_ELSE, Actor
@@ -57,15 +58,13 @@ class Store:
         """Create the folders, upgrade the schema, sweep what killed processes left.
 
         ``clock`` gives seconds since 1970 and is what leases run on. Raises StorageFull, StoreUnavailable,
-        StoreDamaged, NewerSchema, BadInput (settings).
+        StoreDamaged, NewerSchema, BadInput (settings), BadEncryptionKey.
         """
         with full_disk_named(settings.data):
-            for folder in (
-                settings.data,
-                settings.uploads_folder,
-                settings.recordings_folder,
-                settings.fits_folder,
-            ):
+            settings.data.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
+        settle_encryption(settings.data)
+        with full_disk_named(settings.data):
+            for folder in (settings.uploads_folder, settings.recordings_folder, settings.fits_folder):
                 folder.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
         database = Database(settings.database_url)
         close_to_others(settings.data.resolve(), database.files)
@@ -116,7 +115,11 @@ def close_to_others(data: Path, database_files: Sequence[Path]) -> None:
     home, that others have to pass. What another user owns stays as it is, with a warning.
     """
     entries = list(data.iterdir())
-    ours = [entry for entry in entries if entry.name in (*FOLDERS, LOCK, WHO) or entry in database_files]
+    ours = [
+        entry
+        for entry in entries
+        if entry.name in (*FOLDERS, LOCK, WHO, KEY_ID_FILE) or entry in database_files
+    ]
     places = [data] if len(ours) == len(entries) else ours
     closed = 0
     for place in (*places, *database_files):

@@ -15,6 +15,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
+from glovecal_client.encryption.kept_file import create_whole, open_kept
 from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.video_file import ABOUT, MOST_PICTURES, picture_name
 from glovecal_models.documents import UNREADABLE_ARCHIVE, read_json
@@ -129,7 +130,9 @@ class Videos:
         facts = check_preview(preview)
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         partial = self._path(take).with_suffix(".partial")
-        shutil.copyfile(preview, partial)
+        partial.unlink(missing_ok=True)
+        with open_kept(preview) as file, create_whole(partial) as kept:
+            shutil.copyfileobj(file, kept)
         move_over(partial, self._path(take))
         return facts
 
@@ -144,7 +147,7 @@ class Videos:
     def picture(self, take: str, number: int) -> bytes:
         """One JPEG picture. Raises NotFound, BadInput."""
         try:
-            with zipfile.ZipFile(self._found(take)) as file:
+            with open_kept(self._found(take)) as content, zipfile.ZipFile(content) as file:
                 return file.read(picture_name(number))
         except KeyError as error:
             raise NotFound(f"the video of take {take} has no picture {number}") from error
@@ -166,7 +169,7 @@ def check_preview(path: Path) -> VideoFacts:
     facts = _facts(path)
     if not (np.diff(facts.times_s) > 0).all():
         raise BadInput("times_s of the video's pictures must increase")
-    with zipfile.ZipFile(path) as file:
+    with open_kept(path) as content, zipfile.ZipFile(content) as file:
         wanted = {picture_name(number) for number in range(len(facts.times_s))} | {ABOUT}
         entries = {entry.filename: entry for entry in file.infolist()}
         if set(entries) != wanted or len(entries) != len(file.infolist()):
@@ -191,7 +194,7 @@ def check_preview(path: Path) -> VideoFacts:
 
 def _facts(path: Path) -> VideoFacts:
     try:
-        with zipfile.ZipFile(path) as file:
+        with open_kept(path) as content, zipfile.ZipFile(content) as file:
             entry = file.getinfo(ABOUT)
             if entry.file_size > LARGEST_ABOUT:
                 raise BadInput(f"{ABOUT} has {entry.file_size} bytes; at most {LARGEST_ABOUT}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from glovecal_client.encryption.kept_file import read_kept
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.training import uncertain_above
 from glovecal_models.errors import BadInput
@@ -180,9 +181,10 @@ else:
 
 def calibration_text(path: Path) -> str:
     """The whole file, UTF-8 or else Windows-1252. Raises BadInput for one that is too long."""
-    if path.stat().st_size > MOST_CHARACTERS:
+    content = read_kept(path, MOST_CHARACTERS + 1)
+    if len(content) > MOST_CHARACTERS:
         raise BadInput(f"{path.stat().st_size} bytes are no calibration: {MOST_CHARACTERS} at most")
-    return as_text(path.read_bytes())
+    return as_text(content)
 
 
 def as_text(content: bytes) -> str:

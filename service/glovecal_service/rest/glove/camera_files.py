@@ -40,7 +40,8 @@ def put_camera_file(kind: Kind, name: NameInPath, body: NewCameraFile, parts: Pa
     upload = parts.uploads.find(body.upload)
     if upload is None:
         raise NotFound(f"no upload {body.upload[:12]}; send the file to /v1/uploads first")
-    _files(parts).keep(kind, name, upload)
+    with parts.uploads.under_names((upload.name, upload)) as [file]:
+        _files(parts).keep(kind, name, file)
     return list_camera_files(parts)
 
 

@@ -14,6 +14,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import Route, compile_path
 
+from glovecal_client.errors import BadEncryptionKey, DamagedFile
 from glovecal_models.errors import (
     BadInput,
     BadLayout,
@@ -60,10 +61,12 @@ def problem_of(error: Exception) -> Problem:
             return Problem(409, "conflict", str(error))
         case StorageFull():
             return storage_full(str(error))
-        case StoreDamaged() | DamagedArtifact():
+        case StoreDamaged() | DamagedArtifact() | DamagedFile():
             return Problem(500, "damaged", str(error), title="Damaged data")
         case StoreUnavailable():
             return Problem(503, "store-unavailable", str(error), headers={"Retry-After": "5"})
+        case BadEncryptionKey():
+            return Problem(503, "store-unavailable", str(error))
         case BadInput():
             return _bad_input(error)
         case ClientDisconnect():

@@ -9,13 +9,15 @@ import shutil
 import tempfile
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
-from glovecal_client.operating_system import move_over, name_for_a_file, sync_file
+from glovecal_client.encryption.kept_file import create_whole, finish_file, is_kept_encrypted, open_kept
+from glovecal_client.operating_system import move_over, name_for_a_file
+from glovecal_service.operating_system import memory_file, path_of
 from glovecal_service.store.blobs import full_disk_named, require_room
 
 TEMPORARY = ".partial"
@@ -68,7 +70,8 @@ class UploadFolder:
             temporary.unlink(missing_ok=True)
 
     def find(self, sha256: str) -> Path | None:
-        """The upload of that name, or None. ``sha256`` must be 64 hex digits already."""
+        """The upload of that name, or None; ``open_kept`` reads it. ``sha256`` must be 64 hex digits
+        already."""
         path = self.folder / sha256
         return path if path.is_file() else None
 
@@ -76,15 +79,22 @@ class UploadFolder:
     def under_names(self, *files: tuple[str, Path]) -> Iterator[list[Path]]:
         """The uploads under the names their users gave them, for as long as they are being read.
 
-        Readers name the file in their errors. Each of ``files`` is a checked file name and an upload.
+        Readers name the file in their errors. Each of ``files`` is a checked file name and an upload. One
+        that is encrypted is decrypted into memory; where the system has no files there, onto the disk.
         """
-        with tempfile.TemporaryDirectory(dir=self.folder, suffix=TEMPORARY) as folder:
+        with (
+            tempfile.TemporaryDirectory(dir=self.folder, suffix=TEMPORARY) as folder,
+            ExitStack() as held,
+        ):
             named = []
             for number, (name, upload) in enumerate(files):
                 place = Path(folder) / str(number)
                 place.mkdir()
                 named.append(place / name_for_a_file(name))
-                _link(upload, named[-1])
+                if is_kept_encrypted(upload):
+                    _decrypt(upload, named[-1], held)
+                else:
+                    _link(upload, named[-1])
             yield named
 
     def _keep(self, temporary: Path, digest: str, size: int) -> Upload:
@@ -96,7 +106,7 @@ class UploadFolder:
 
 async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
     digest, size, waiting = hashlib.sha256(), 0, bytearray()
-    with path.open("xb") as file:
+    with create_whole(path) as file:
 
         def write() -> None:
             digest.update(waiting)
@@ -104,8 +114,7 @@ async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
 
         def finish() -> None:
             write()
-            file.flush()
-            sync_file(file)
+            finish_file(file)
 
         async for chunk in chunks:
             waiting += chunk
@@ -115,6 +124,19 @@ async def _write(path: Path, chunks: AsyncIterator[bytes]) -> tuple[str, int]:
                 waiting.clear()
         await run_in_threadpool(finish)
     return digest.hexdigest(), size
+
+
+def _decrypt(source: Path, name: Path, held: ExitStack) -> None:
+    file = memory_file()
+    with open_kept(source) as encrypted:
+        if file is None:
+            with name.open("xb") as plain:
+                shutil.copyfileobj(encrypted, plain)
+        else:
+            held.enter_context(file)
+            shutil.copyfileobj(encrypted, file)
+            file.flush()
+            name.symlink_to(path_of(file))
 
 
 def _link(source: Path, name: Path) -> None:

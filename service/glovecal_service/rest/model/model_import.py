@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel, Field, ValidationError
 
+from glovecal_client.encryption.kept_file import read_kept
 from glovecal_models.calibration.artifact import load, model_id
 from glovecal_models.calibration.explanation import FrameExplainer
 from glovecal_models.calibration.model import CalibrationModel
@@ -102,7 +103,7 @@ def import_upload(
 
 
 def _import(parts: Parts, path: Path, options: ModelImport) -> ImportedModel:
-    return import_artifact(parts, path.read_bytes(), options)
+    return import_artifact(parts, read_kept(path), options)
 
 
 def import_artifact(parts: Parts, artifact: bytes, options: ModelImport) -> ImportedModel:

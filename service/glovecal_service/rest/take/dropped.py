@@ -50,7 +50,8 @@ async def card_table(sha256: UploadInPath, parts: PartsNeeded) -> CardTable:
     source = kept_upload(parts, sha256)
     with tempfile.TemporaryDirectory(prefix="glovecal-card-") as folder:
         target = Path(folder, "card.csv")
-        layout, recording = await anyio.to_thread.run_sync(_written, source, target)
+        with parts.uploads.under_names((source.name, source)) as [card]:
+            layout, recording = await anyio.to_thread.run_sync(_written, card, target)
         kept = await parts.uploads.receive(_chunks(target))
     seconds = recording.times_s(FRAME_RATE_HZ, MULTIPLIER)[-1]
     return CardTable(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Annotated
 
@@ -163,11 +165,11 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
         path = Path(folder.name, name_for_a_file(name + chosen.suffix))
 
         def write(cancelled: Cancel) -> None:
-            asked = _asked(parts, body, path)
-            if asked.is_short:
-                write_motion(asked)
-            else:
-                in_process(write_motion, asked, "the export", cancelled)
+            with _asked(parts, body, path) as asked:
+                if asked.is_short:
+                    write_motion(asked)
+                else:
+                    in_process(write_motion, asked, "the export", cancelled)
 
         await in_time(request, parts, write, limit_s=LIMIT_S, what="this export")
     except BaseException:
@@ -192,7 +194,8 @@ async def look_at_character(body: Motion, request: Request, parts: PartsNeeded) 
     answer: list[CharacterHand] = []
 
     def look(cancelled: Cancel) -> None:
-        seen = fits(_asked(parts, body, Path(f"motion.{body.format}")))
+        with _asked(parts, body, Path(f"motion.{body.format}")) as asked:
+            seen = fits(asked)
         answer.extend(
             CharacterHand.model_validate(
                 {**vars(one), "missing": list(one.missing), "choices": list(one.choices)}
@@ -204,7 +207,14 @@ async def look_at_character(body: Motion, request: Request, parts: PartsNeeded) 
     return answer
 
 
-def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
+@contextmanager
+def _asked(parts: Parts, body: Motion, path: Path) -> Iterator[MotionFile]:
+    """While the uploads that it needs can be read."""
+    with ExitStack() as held:
+        yield _motion_file(parts, body, path, held)
+
+
+def _motion_file(parts: Parts, body: Motion, path: Path, held: ExitStack) -> MotionFile:
     for name, given in (("models", body.models), ("hands", body.hands), ("shifts_s", body.shifts_s)):
         if given and len(given) != len(body.takes):
             raise BadInput(f"{len(given)} {name} for {len(body.takes)} takes: give one a take, or none")
@@ -217,12 +227,14 @@ def _asked(parts: Parts, body: Motion, path: Path) -> MotionFile:
         file = parts.uploads.find(body.body.upload)
         if file is None:
             raise NotFound(f"no upload {body.body.upload[:12]}; send the TRC file to /v1/uploads first")
+        [file] = held.enter_context(parts.uploads.under_names((file.name, file)))
         markers = BodyFile(file, body.body.shift_s, tuple(body.body.right), tuple(body.body.left))
     onto: Path | str | None = body.onto
     if body.onto is not None and len(body.onto) == SHA256_LENGTH:
         onto = parts.uploads.find(body.onto)
         if onto is None:
             raise NotFound(f"no upload {body.onto[:12]}; send the character's or robot's file first")
+        [onto] = held.enter_context(parts.uploads.under_names((onto.name, onto)))
     content = "angles" if onto is not None and is_robot(onto) else body.content
     resampling = Resampling(body.rate_hz, body.low_pass_hz)
     return MotionFile(
