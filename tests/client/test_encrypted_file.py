@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from encryption_support import use_new_key
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +33,7 @@ from glovecal_client.encryption.kept_file import (
     read_kept,
     resume_growing,
 )
-from glovecal_client.encryption.key_file import EncryptionKey
+from glovecal_client.encryption.key_file import KEY_FILE, EncryptionKey, make_key_file
 from glovecal_client.errors import BadEncryptionKey, DamagedFile
 from glovecal_client.frame_log import cut_damaged_tail
 
@@ -45,6 +44,10 @@ WRITES = st.lists(
 )
 """Sizes of writes, some about as long as a slot."""
 KINDS = st.sampled_from([WHOLE, GROWING])
+
+
+def use_new_key(place: Path, monkeypatch: pytest.MonkeyPatch, name: str = "disk.key") -> None:
+    monkeypatch.setenv(KEY_FILE, str(make_key_file(place / name).file))
 
 
 def written(kind: bytes, sizes: list[int], seed: int = 0) -> tuple[bytes, bytes]:

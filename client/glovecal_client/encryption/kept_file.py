@@ -7,6 +7,8 @@ without a key stays readable when there is one.
 from __future__ import annotations
 
 import io
+import os
+import shutil
 from collections.abc import Callable
 from io import FileIO
 from pathlib import Path
@@ -22,10 +24,12 @@ from glovecal_client.encryption.encrypted_file import (
     is_encrypted,
 )
 from glovecal_client.encryption.key_file import key_of_environment
-from glovecal_client.operating_system import sync_file
+from glovecal_client.operating_system import move_over, sync_file
+from glovecal_client.private_files import open_private
 
 GrowingFile = FileIO | EncryptingWriter
 """Written without a buffer; what was written is with the operating system."""
+UNFINISHED = ".encrypting"
 Opener = Callable[[str, int], int]
 
 
@@ -128,6 +132,32 @@ def cut_file(path: Path, end: int) -> int:
                 kept.write(tail)
             file.truncate(end)
     return len(tail)
+
+
+def encrypt_file(path: Path, *, grows: bool) -> bool:
+    """Put an encrypted file in the place of a plain one, with its times; False for one that is encrypted.
+
+    Killed at any moment, ``path`` is the one or the other; what is unfinished has the suffix ``UNFINISHED``.
+    Nobody may be writing to it. Raises OSError, BadEncryptionKey.
+    """
+    if is_kept_encrypted(path):
+        return False
+    about, unfinished = path.stat(), path.with_name(path.name + UNFINISHED)
+    unfinished.unlink(missing_ok=True)
+    try:
+        with path.open("rb") as plain, _created_as(unfinished, grows=grows) as file:
+            shutil.copyfileobj(plain, file, 1 << 20)
+            finish_file(file)
+        os.utime(unfinished, ns=(about.st_atime_ns, about.st_mtime_ns))
+        move_over(unfinished, path, durably=True)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
+    return True
+
+
+def _created_as(path: Path, *, grows: bool) -> BinaryIO:
+    return cast("BinaryIO", create_growing(path, opener=open_private)) if grows else create_whole(path)
 
 
 def encrypted(content: bytes) -> bytes:
