@@ -178,7 +178,7 @@ class FrameLog:
         self._waiting: deque[bytes] = deque()
         self._append_problem: str | None = None
         self._sync_problem: str | None = None
-        self._synced_bytes = end
+        self._synced_bytes = self._file_bytes = end
 
     @classmethod
     def create(cls, path: Path | str, meta: Mapping[str, Any]) -> FrameLog:
@@ -214,6 +214,13 @@ class FrameLog:
     def waiting(self) -> int:
         """Records in memory that the disk did not take yet."""
         return len(self._waiting)
+
+    @property
+    def file_bytes(self) -> int:
+        """What the file takes on the disk; more than ``good_bytes`` where it is encrypted."""
+        if not self._file.closed:
+            self._file_bytes = os.fstat(self._file.fileno()).st_size
+        return self._file_bytes
 
     @property
     def problem(self) -> str | None:
@@ -274,6 +281,7 @@ class FrameLog:
             self.lost_records += len(self._waiting)
             self._waiting.clear()
             self.sync()
+            self._file_bytes = self.file_bytes
             self._file.close()
 
 

@@ -26,12 +26,13 @@ from typing import NoReturn
 
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings, CaptureSummary
 from glovecal_client.capture.device import build_device, device_names, device_options
+from glovecal_client.encryption.key_file import KEY_FILE, key_of_environment
 from glovecal_client.errors import BadOption, CaptureRefused, ClientError
 from glovecal_client.keys import GloveKeys, check_identifier, subject_name
 from glovecal_client.private_files import keep_private
 from glovecal_client.program import never_wait, run_command, say, stopped_by_signals
 from glovecal_client.session import DEFAULT_ENDPOINT
-from glovecal_client.site.member import settle_environment, site_file
+from glovecal_client.site.member import SITE_FILE, settle_environment, site_file
 
 UNIT_LOG_LIMIT = 8_000_000_000
 """Bytes that capture at boot keeps, five days at 120 Hz."""
@@ -236,7 +237,7 @@ RestrictSUIDSGID=yes
 RestrictNamespaces=yes
 RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
 SystemCallArchitectures=native
-{listening}{site}
+{listening}{credentials}
 [Install]
 WantedBy=multi-user.target
 """
@@ -283,17 +284,24 @@ def unit_text(name: str, glove: str, arguments: Sequence[str], *, dials_in: bool
         glove=glove,
         command=command,
         listening="" if dials_in else "SocketBindDeny=any\n",
-        site=_credential(),
+        credentials=_credentials(),
     )
 
 
-def _credential() -> str:
-    """systemd hands the site's file to a user that could not read it; after a renewal, restart the unit."""
-    file = site_file()
-    if file is None:
-        return ""
-    place = str(file.absolute()).replace("%", "%%")
-    return f"LoadCredential=site.glovecal:{place}\nEnvironment=GLOVECAL_SITE_FILE=%d/site.glovecal\n"
+def _credentials() -> str:
+    """systemd hands the site's file and the key to a user that could not read them; after a renewal, restart
+    the unit."""
+    key = key_of_environment()
+    files = {SITE_FILE: site_file(), KEY_FILE: None if key is None else key.file}
+    lines = ""
+    for variable, file in files.items():
+        if file is not None:
+            name, place = _CREDENTIAL[variable], str(file.absolute()).replace("%", "%%")
+            lines += f"LoadCredential={name}:{place}\nEnvironment={variable}=%d/{name}\n"
+    return lines
+
+
+_CREDENTIAL = {SITE_FILE: "site.glovecal", KEY_FILE: "encryption.key"}
 
 
 def _quoted(word: str) -> str:

@@ -245,6 +245,7 @@ class CaptureDaemon:
             if limit is not None:
                 folder.forget(limit // 2, self._report)
             self._earlier_runs = folder.runs()
+            folder.encrypt_earlier(self._report)
             self._log = folder.create(self._run_id, self._meta())
             return self._run_with_log(folder, stop)
         finally:
@@ -296,7 +297,7 @@ class CaptureDaemon:
     @property
     def _log_is_full(self) -> bool:
         limit = self._settings.log_limit
-        return limit is not None and self._log.good_bytes >= limit // 2
+        return limit is not None and self._log.file_bytes >= limit // 2
 
     def _beat(self) -> None:
         """Once a second: the status, with the last refused reading if there was one since."""

@@ -18,12 +18,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from glovecal_client.encryption.kept_file import open_kept
+from glovecal_client.encryption.kept_file import UNFINISHED, encrypt_file, is_encrypting, open_kept
 from glovecal_client.encryption.key_file import settle_encryption
 from glovecal_client.errors import BadEncryptionKey, BadName, CaptureRefused, DamagedLog, reason_of
 from glovecal_client.frame_log import FrameLog, Recording, cut_damaged_tail, scan_records
 from glovecal_client.keys import GloveKeys
-from glovecal_client.operating_system import lock_file
+from glovecal_client.operating_system import lock_file, remove
 from glovecal_client.private_files import make_private
 from glovecal_client.wire.frame import frame_sequence
 
@@ -78,6 +78,17 @@ class LogFolder:
             if cut:
                 report(f"earlier recording {path.name}: {cut} damaged bytes moved to {path.name}.cut")
 
+    def encrypt_earlier(self, report: Callable[[str], None]) -> None:
+        """Beside the capture encrypt logs of earlier runs that were written before a key was named.
+
+        Whoever looks frames up finds the one file or the other, with the same content.
+        """
+        for unfinished in self.path.glob(f"*{UNFINISHED}"):
+            remove(unfinished)
+        if is_encrypting():
+            logs = sorted(self.path.glob(f"*{SUFFIX}*"))
+            threading.Thread(target=_encrypt, args=(logs, report), name="encryption", daemon=True).start()
+
     def forget(self, at_most: int, report: Callable[[str], None]) -> None:
         """Delete logs of earlier runs, oldest first, until those left have ``at_most`` bytes together."""
         kept = 0
@@ -122,6 +133,17 @@ class LogFolder:
     def find(self, run_id: int) -> Path | None:
         """The log of a run, None if there is none."""
         return next(iter(self.path.glob(f"*-{run_id:016x}{SUFFIX}")), None)
+
+
+def _encrypt(logs: list[Path], report: Callable[[str], None]) -> None:
+    for log in logs:
+        try:
+            if encrypt_file(log, grows=True):
+                report(f"earlier recording {log.name} is encrypted now")
+        except FileNotFoundError:  # over its limit meanwhile
+            continue
+        except OSError as error:
+            report(f"earlier recording {log.name} is not encrypted: {reason_of(error)}")
 
 
 _EVERY = 64

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import secrets
 import shutil
 from collections.abc import Callable
 from io import FileIO
@@ -142,8 +143,7 @@ def encrypt_file(path: Path, *, grows: bool) -> bool:
     """
     if is_kept_encrypted(path):
         return False
-    about, unfinished = path.stat(), path.with_name(path.name + UNFINISHED)
-    unfinished.unlink(missing_ok=True)
+    about, unfinished = path.stat(), path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
     try:
         with path.open("rb") as plain, _created_as(unfinished, grows=grows) as file:
             shutil.copyfileobj(plain, file, 1 << 20)

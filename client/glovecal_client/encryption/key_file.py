@@ -87,7 +87,7 @@ def settle_encryption(data: Path) -> EncryptionKey | None:
     remembered = data / KEY_ID_FILE
     try:
         known = remembered.read_text(encoding="ascii").strip()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         known = ""
     except (OSError, UnicodeDecodeError) as error:
         raise BadEncryptionKey(f"{remembered} cannot be read: {reason_of(error)}") from error

@@ -25,6 +25,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from glovecal_client.encryption.kept_file import is_encrypting
 from glovecal_client.errors import reason_of
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.dask_log import silence_dask
@@ -56,6 +57,8 @@ _CONFIG = {
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
 }
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
+_NOTHING_SPILLED = {"distributed.worker.memory.target": False, "distributed.worker.memory.spill": False}
+"""What fills a worker's memory does not go to the disk, where it would lie as it is."""
 _LONGEST_FOLDER = 75
 """Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
 _IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.questions.catalogue"]
@@ -162,7 +165,7 @@ class Workers:
             if self._closed:
                 raise WorkersLost("the service is stopping")
             if self._client is None:
-                configure(_CONFIG)
+                configure(_CONFIG | _NOTHING_SPILLED if is_encrypting() else _CONFIG)
                 if FORKS and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
