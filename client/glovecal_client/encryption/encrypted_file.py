@@ -2,7 +2,7 @@
 
     57 bytes  ``GLVENC1`` and a line feed; ``W`` or ``G`` (below); 16 bytes id of the key; 16 random bytes;
               16 bytes that prove the others with the key
-    slots     of 65,536 bytes, the last as long as it is; each begins with u64 place of its first byte in
+    slots     of 16,384 bytes, the last as long as it is; each begins with u64 place of its first byte in
               the content, then blocks, then zeros where no block fits any more
     blocks    u32 length of the content, its highest bit set in a file's last block; 12 random bytes (nonce);
               the content encrypted; 16 bytes (tag)
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 MAGIC = b"GLVENC1\n"
 WHOLE, GROWING = b"W", b"G"
-SLOT_BYTES = 65536
+SLOT_BYTES = 16384
 _HEAD = struct.Struct("<8sc16s16s16s")
 HEADER_BYTES = _HEAD.size
 _START, _LENGTH, _PLACE = struct.Struct("<Q"), struct.Struct("<I"), struct.Struct("<QQ?")

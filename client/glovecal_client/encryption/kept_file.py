@@ -18,7 +18,6 @@ from typing import IO, BinaryIO, Literal, cast
 from glovecal_client.encryption.encrypted_file import (
     GROWING,
     HEADER_BYTES,
-    SLOT_BYTES,
     WHOLE,
     DecryptingReader,
     EncryptingWriter,
@@ -54,7 +53,7 @@ def open_kept(path: Path) -> BinaryIO:
             file.seek(0)
             return io.BufferedReader(file)
         reader = DecryptingReader(file, key, path.name)
-        return cast("BinaryIO", io.BufferedReader(reader, SLOT_BYTES))
+        return cast("BinaryIO", io.BufferedReader(reader, 1 << 16))
     except BaseException:
         file.close()
         raise

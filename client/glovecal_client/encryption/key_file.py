@@ -150,13 +150,13 @@ def _read_once(file: Path) -> EncryptionKey:
             f"others on this computer may use the key {file} (its mode is {mode:o}): chmod 600 it, and make "
             "a new one if somebody read it"
         )
-    found = _CONTENT.match(content.decode("ascii", "replace"))
-    if found is None:
+    key = _CONTENT.match(content.decode("ascii", "replace"))
+    if key is None:
         raise BadEncryptionKey(
             f"{file}, which {KEY_FILE} names, is no key of Glovecal: it must hold the line {FORMAT} and one "
             f"of 64 hexadecimal digits. Make one: {MADE_BY}"
         )
-    return EncryptionKey(file, bytes.fromhex(found[1]))
+    return EncryptionKey(file, bytes.fromhex(key[1]))
 
 
 def _forbidden(file: Path) -> int:
