@@ -46,6 +46,7 @@ from glovecal_service.rest.http.error_handlers import AllowedMethods, install_er
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
 from glovecal_service.rest.http.problem import install_openapi
 from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who
+from glovecal_service.rest.http.temporary_folder import sweep_temporary_folders
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.rest.job import jobs
 from glovecal_service.rest.model import (
@@ -153,6 +154,7 @@ def create_app(
         opened = store or await run_in_threadpool(Store.open, settings)
         uploads_folder = UploadFolder(settings.uploads_folder)
         await run_in_threadpool(uploads_folder.sweep)
+        await run_in_threadpool(sweep_temporary_folders)
         await run_in_threadpool(finish_erasures, opened, settings)
         app.state.parts = Parts(
             settings, opened, uploads_folder, metrics, Predictors(opened), Filming(settings.films_folder),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +16,7 @@ from glovecal_service.file_kinds import kind_of
 from glovecal_service.request_types import SHA256
 from glovecal_service.rest.http.dependencies import PartsNeeded
 from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.temporary_folder import temporary_folder
 from glovecal_service.rest.take.answer import CardTable, UploadKind
 from glovecal_service.rest.take.uploaded_files import kept_upload
 
@@ -48,7 +48,7 @@ async def card_table(sha256: UploadInPath, parts: PartsNeeded) -> CardTable:
     """The recording of a CyberGlove III becomes a take table among the uploads; import it with its layout.
     422 for a file without a record."""
     source = kept_upload(parts, sha256)
-    with tempfile.TemporaryDirectory(prefix="glovecal-card-") as folder:
+    with temporary_folder() as folder:
         target = Path(folder, "card.csv")
         with parts.uploads.under_names((source.name, source)) as [card]:
             layout, recording = await anyio.to_thread.run_sync(_written, card, target)

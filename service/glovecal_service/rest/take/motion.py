@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
@@ -31,6 +30,7 @@ from glovecal_service.request_types import ModelReference, StrictBody, TakeRefer
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.temporary_folder import temporary_folder
 from glovecal_service.rest.take.answer import CharacterHand, MotionFormat
 from glovecal_service.store.errors import Conflict, NotFound
 
@@ -158,7 +158,7 @@ async def export_motion(body: Motion, request: Request, parts: PartsNeeded) -> F
     """Calibrated by the model that is named, else by the active one; effects with a memory start in the
     pre-roll. 409 where angles are asked for and no model is active, or nobody said which hand it is.
     """
-    folder = tempfile.TemporaryDirectory(prefix="glovecal-motion-")
+    folder = temporary_folder()
     try:
         chosen = format_of(f"motion.{body.format}")
         name = PurePosixPath(body.file_name).name.removesuffix(chosen.suffix)[:LONGEST_NAME] or "motion"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
@@ -22,6 +21,7 @@ from glovecal_service.rest.http.dependencies import StoreNeeded
 from glovecal_service.rest.http.list_part import PartWanted, tell_rest
 from glovecal_service.rest.http.problem import Problem, change_problems, problems, without_damaged
 from glovecal_service.rest.http.request_types import HandFilter, IdInPath, LayoutFilter, SubjectFilter
+from glovecal_service.rest.http.temporary_folder import temporary_folder
 from glovecal_service.rest.take.answer import CheckView, Take
 from glovecal_service.rest.take.uploads import MEDIA_TYPES, TableFormat
 from glovecal_service.store.records import TakeRecord, incomplete_sentences
@@ -191,7 +191,7 @@ def export_take(
 ) -> FileResponse:
     """A take whose reference has a clock of its own is two tables: ask for each `part` (409 for `all`)."""
     take = store.takes.load_recorded(id)
-    folder = tempfile.TemporaryDirectory(prefix="glovecal-export-")
+    folder = temporary_folder()
     try:
         path = _chosen_part(write_takes([take], Path(folder.name) / f"{id}.{format}"), part, take)
     except BaseException:
