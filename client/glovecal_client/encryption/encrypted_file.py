@@ -109,14 +109,15 @@ class _Cipher:
 def is_encrypted(begins: bytes, key: EncryptionKey | None) -> bool:
     """Whether a file whose first ``HEADER_BYTES`` are these is one of ours, damaged or not.
 
-    With a key that is so too where the magic is damaged, and where the file ends within it.
+    With a key that is so too where the magic is damaged, and where the file ends within it; an empty file is
+    a plain one.
     """
     if begins.startswith(MAGIC):
         return True
     if key is None:
         return False
     if len(begins) < _HEAD.size:
-        return MAGIC.startswith(begins)
+        return bool(begins) and MAGIC.startswith(begins)
     _, kind, key_id, salt, _ = _HEAD.unpack(begins)
     return key_id == key.id and begins[len(MAGIC) :] == _Cipher(key, kind, salt).header[len(MAGIC) :]
 
