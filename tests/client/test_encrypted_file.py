@@ -5,14 +5,17 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loopback import eventually
 
 from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
+from glovecal_client.capture.log_folder import LogFolder, LogIndex
 from glovecal_client.encryption.encrypted_file import (
     GROWING,
     HEADER_BYTES,
@@ -24,18 +27,23 @@ from glovecal_client.encryption.encrypted_file import (
     is_encrypted,
 )
 from glovecal_client.encryption.kept_file import (
+    UNFINISHED,
     create_growing,
     create_whole,
     decrypted,
     encrypted,
     finish_file,
+    is_kept_encrypted,
     open_kept,
     read_kept,
     resume_growing,
 )
 from glovecal_client.encryption.key_file import KEY_FILE, EncryptionKey, make_key_file
-from glovecal_client.errors import BadEncryptionKey, DamagedFile
+from glovecal_client.errors import BadEncryptionKey, DamagedFile, DeviceError, DeviceFinished
 from glovecal_client.frame_log import cut_damaged_tail
+from glovecal_client.keys import GloveKeys
+from glovecal_client.pictures.source import Picture
+from glovecal_client.pictures.video_file import VideoFilePictures, VideoWriter
 
 KEY, OTHER_KEY = (EncryptionKey(Path(name), name.encode() * 8) for name in ("here", "away"))
 WRITES = st.lists(
@@ -307,3 +315,118 @@ def test_without_its_key_a_log_is_neither_read_nor_cut(
             attempt(log)
     assert log.read_bytes() == content
     assert not log.with_name("whole.cut").exists()
+
+
+# Videos and label images.
+
+
+def test_an_encrypted_film_is_as_it_was_drawn_and_is_read_up_to_where_it_was_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("cv2")
+    use_new_key(tmp_path, monkeypatch)
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    film, random = tmp_path / "film.mkv", np.random.default_rng(1)
+    pictures = [Pixels(random.integers(0, 255, (48, 64, 3), np.uint8)) for _ in range(40)]
+    writer = VideoWriter(film, 30.0)
+    for number, drawn in enumerate(pictures):
+        writer.write(Picture(drawn.pixels, number * 33_000_000, number))
+    assert list((tmp_path / "temporary").iterdir()) == []
+    writer.close()
+    content = film.read_bytes()
+    assert b"matroska" not in content
+    assert frames_of(film) == (pictures, "is over after 40 pictures")
+    film.write_bytes(content[: len(content) // 2])
+    kept, said = frames_of(film)
+    assert 10 < len(kept) < 40
+    assert kept == pictures[: len(kept)]
+    assert "ends in the middle" in said
+
+
+def frames_of(film: Path) -> tuple[list[Pixels], str]:
+    source, found = VideoFilePictures(film), []
+    source.open()
+    try:
+        while True:
+            found.append(Pixels(source.read().pixels))
+    except DeviceFinished as ended:
+        return found, str(ended).removeprefix(f"video:{film} ")
+    finally:
+        source.close()
+
+
+class Pixels:
+    """Of a picture; equal where all are."""
+
+    def __init__(self, pixels: np.ndarray) -> None:
+        self.pixels = pixels
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pixels) and np.array_equal(self.pixels, other.pixels)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def test_a_film_whose_disk_is_full_says_so_and_holds_nobody_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("cv2")
+    use_new_key(tmp_path, monkeypatch)
+    written = 0
+
+    def is_full(self: EncryptingWriter, content: bytes) -> int:
+        nonlocal written
+        written += len(content)
+        if written > 50_000:
+            raise OSError(28, "No space left on device")
+        return len(content)
+
+    monkeypatch.setattr(EncryptingWriter, "write", is_full)
+    writer = VideoWriter(tmp_path / "film.mkv", 30.0)
+    pixels = np.random.default_rng(1).integers(0, 255, (240, 320, 3), np.uint8)
+
+    def film() -> None:
+        for number in range(500):
+            writer.write(Picture(pixels, number, number))
+
+    with pytest.raises(DeviceError, match=r"film.mkv: No space left on device"):
+        film()
+    writer.close()
+
+
+def test_earlier_logs_are_encrypted_beside_a_capture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keys, told = GloveKeys("lab", "g1"), []
+    folder = LogFolder(tmp_path / "data", keys)
+    log = folder.create(7, META)
+    for message in MESSAGES:
+        log.append(message)
+    log.close()
+    index = LogIndex(log.path)
+    index.extend()
+    folder.close()
+    use_new_key(tmp_path, monkeypatch)
+    folder = LogFolder(tmp_path / "data", keys)
+    (folder.path / f"{log.path.name}.1234{UNFINISHED}").write_bytes(b"of one that was killed")
+    folder.encrypt_earlier(told.append)
+    eventually(lambda: told, "it is told")
+    folder.close()
+    assert told == [f"earlier recording {log.path.name} is encrypted now"]
+    assert sorted(path.name for path in folder.path.iterdir()) == [log.path.name, "lock"]
+    assert is_kept_encrypted(log.path)
+    assert index.payloads(2, 3, max_count=9, max_bytes=1 << 20) == MESSAGES[2:4]
+
+
+def test_an_encrypted_film_needs_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cv2")
+    use_new_key(tmp_path, monkeypatch)
+
+    def none(path: Path) -> None:
+        raise OSError(38, "Windows has no pipes with paths")
+
+    monkeypatch.setattr("glovecal_client.pictures.encrypted_video.named_pipe", none)
+    writer = VideoWriter(tmp_path / "film.mkv", 30.0)
+    with pytest.raises(DeviceError, match="cannot be encrypted while it is written: Windows has no pipes"):
+        writer.write(Picture(np.zeros((48, 64, 3), np.uint8), 0, 0))
+    writer.close()
+    assert not (tmp_path / "film.mkv").exists()

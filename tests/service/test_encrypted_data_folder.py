@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -9,10 +10,11 @@ import signal
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import anyio
 import httpx
 import pytest
 from realtime_support import eventually, free_endpoint
@@ -21,6 +23,8 @@ from glovecal_client import FrameLog, Recording
 from glovecal_client.encryption.kept_file import is_kept_encrypted, read_kept
 from glovecal_client.encryption.key_file import KEY_FILE, KEY_ID_FILE, make_key_file, settle_encryption
 from glovecal_client.errors import BadEncryptionKey
+from glovecal_service.rest.http import upload_folder
+from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.encrypt_folder import encrypt_folder
@@ -295,3 +299,29 @@ def test_a_data_folder_remembers_its_key(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.delenv(KEY_FILE)
     with pytest.raises(BadEncryptionKey, match="Nothing was changed"):
         settle_encryption(tmp_path / "data")
+
+
+async def whole(content: bytes) -> AsyncIterator[bytes]:
+    yield content
+
+
+@pytest.mark.parametrize("in_memory", [True, False])
+def test_an_encrypted_upload_is_read_by_path_and_does_not_lie_on_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_memory: bool
+) -> None:
+    monkeypatch.setenv(KEY_FILE, str(make_key_file(tmp_path / "disk.key").file))
+    if not in_memory:
+        monkeypatch.setattr(upload_folder, "memory_file", lambda: None)
+    uploads, content = UploadFolder(tmp_path / "uploads"), TABLE.encode()
+    upload = anyio.run(uploads.receive, whole(content))
+    assert upload.sha256 == hashlib.sha256(content).hexdigest()
+    assert is_kept_encrypted(upload.path)
+    with uploads.under_names(("my table.csv", upload.path)) as [named]:
+        assert (named.name, named.read_bytes(), named.stat().st_size) == (
+            "my table.csv",
+            content,
+            len(content),
+        )
+        plain = [path for path in uploads.folder.rglob("*") if path.is_file() and not path.is_symlink()]
+        assert [path for path in plain if b"time_s" in path.read_bytes()] == ([] if in_memory else [named])
+    assert list(uploads.folder.iterdir()) == [upload.path]
