@@ -19,6 +19,8 @@ from glovecal_client.capture import command
 from glovecal_client.capture.command import main, run_capture
 from glovecal_client.capture.daemon import CaptureSettings
 from glovecal_client.capture.log_folder import LogFolder
+from glovecal_client.encryption.key_file import KEY_FILE, key_of_environment, make_key_file
+from glovecal_client.errors import BadEncryptionKey
 
 LUCID = (
     "--device",
@@ -41,6 +43,23 @@ def unit_of(root: Path, name: str = "right") -> RawConfigParser:
     parser.optionxform = str  # type: ignore[assignment,method-assign]
     assert parser.read(root / f"etc/systemd/system/glovecal-capture-{name}.service")
     return parser
+
+
+def test_the_unit_gets_the_key_that_files_are_encrypted_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KEY_FILE, str(make_key_file(tmp_path / "100%.key").file))
+    assert main((*LUCID, "--install-unit", str(tmp_path))) == 0
+    service = unit_of(tmp_path)["Service"]
+    assert service["LoadCredential"] == f"encryption.key:{tmp_path}/100%%.key"
+    assert service["Environment"] == f"{KEY_FILE}=%d/encryption.key"
+    given = make_key_file(tmp_path / "given.key").file
+    given.chmod(0o440)  # as systemd shows a credential
+    monkeypatch.setenv(KEY_FILE, str(given))
+    with pytest.raises(BadEncryptionKey, match="others on this computer may use the key"):
+        key_of_environment()
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(tmp_path))
+    assert key_of_environment() is not None
 
 
 def test_the_unit_captures_with_the_options_it_was_made_with(tmp_path: Path, capsys) -> None:

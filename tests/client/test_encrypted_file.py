@@ -255,6 +255,24 @@ def test_an_encrypted_log_cut_at_every_byte_keeps_every_whole_record(log: Path) 
         assert b"after" not in path.read_bytes()
 
 
+def test_an_encrypted_log_cut_where_a_slot_ends_goes_on(log: Path) -> None:
+    path, payloads = log.with_name("long"), [b"%0100d" % number for number in range(250)]
+    whole = FrameLog.create(path, META)
+    for payload in payloads:
+        whole.append(payload)
+    whole.close()
+    content = path.read_bytes()
+    slot_end = HEADER_BYTES + SLOT_BYTES
+    for length in range(slot_end - 200, slot_end + 200):
+        path.write_bytes(content[:length])
+        resumed = FrameLog.resume(path)
+        kept = resumed.records
+        resumed.append(b"after")
+        resumed.close()
+        assert list(Recording.open(path).payloads()) == [*payloads[:kept], b"after"]
+        assert length // 160 < kept < length // 130
+
+
 def test_an_encrypted_log_with_any_byte_flipped_keeps_the_records_before_it_and_loses_no_bytes(
     log: Path,
 ) -> None:

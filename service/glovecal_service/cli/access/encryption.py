@@ -11,7 +11,7 @@ import typer
 from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.encryption.key_file import KEY_FILE, make_key_file
 from glovecal_client.operating_system import move_over
-from glovecal_client.private_files import open_private
+from glovecal_client.private_files import keep_private, open_private
 from glovecal_models.errors import BadInput
 from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.cli.terminal.printing import Refusal, err, out
@@ -44,6 +44,7 @@ def make_key(
 @app.command("apply")
 def apply() -> None:
     """Encrypt what the data folder held before its key was named; the service must not be running."""
+    keep_private()
     settings = settings_of_environment()
     done = encrypt_folder(settings, lambda file: err.print(str(file), soft_wrap=True))
     for problem in done.problems:
