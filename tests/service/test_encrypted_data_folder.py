@@ -23,10 +23,14 @@ from glovecal_client import FrameLog, Recording
 from glovecal_client.encryption.kept_file import is_kept_encrypted, read_kept
 from glovecal_client.encryption.key_file import KEY_FILE, KEY_ID_FILE, make_key_file, settle_encryption
 from glovecal_client.errors import BadEncryptionKey
+from glovecal_models.errors import DamagedArtifact
+from glovecal_service.jobs.job_kind import Task, TaskResult
+from glovecal_service.jobs.task_run import run_task
 from glovecal_service.rest.http import upload_folder
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
+from glovecal_service.store.blobs import Artifacts, FolderBlobs
 from glovecal_service.store.encrypt_folder import encrypt_folder
 
 pytest.importorskip("cv2")
@@ -325,3 +329,41 @@ def test_an_encrypted_upload_is_read_by_path_and_does_not_lie_on_the_disk(
         plain = [path for path in uploads.folder.rglob("*") if path.is_file() and not path.is_symlink()]
         assert [path for path in plain if b"time_s" in path.read_bytes()] == ([] if in_memory else [named])
     assert list(uploads.folder.iterdir()) == [upload.path]
+
+
+def test_an_encrypted_artifact_has_the_name_of_its_content_and_no_damage_is_missed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    artifacts, content = Artifacts(FolderBlobs(tmp_path / "artifacts")), b"of somebody" * 9
+    name = artifacts.put(content)
+    assert name == hashlib.sha256(content).hexdigest()
+    file = tmp_path / "artifacts" / name
+    monkeypatch.setenv(KEY_FILE, str(make_key_file(tmp_path / "disk.key").file))
+    assert artifacts.get(name) == content
+    assert artifacts.put(content) == name
+    sealed = file.read_bytes()
+    assert b"somebody" not in sealed
+    assert artifacts.get(name) == content
+    for at in range(len(sealed)):
+        for damaged in (sealed[:at], sealed[:at] + bytes([sealed[at] ^ 4]) + sealed[at + 1 :]):
+            file.write_bytes(damaged)
+            with pytest.raises((DamagedArtifact, BadEncryptionKey), match=name):
+                artifacts.get(name)
+    file.write_bytes(sealed[:-1])
+    assert artifacts.put(content) == name
+    assert artifacts.get(name) == content
+
+
+def test_a_worker_that_does_not_know_the_key_keeps_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fits = tmp_path / "data" / "fits"
+    fits.mkdir(parents=True)
+    task = Task("0" * 16, "training", lambda *_: TaskResult({}, {"done": True}), {})
+    key = make_key_file(tmp_path / "disk.key").file
+    for named, error in ((str(key), None), ("", "training: the data folder .* is encrypted with the key")):
+        monkeypatch.setenv(KEY_FILE, named)
+        outcome = run_task(task, fits, fits / "cancel", fits / "progress")
+        assert error is None or re.match(error, outcome.error or "")
+        assert (outcome.error is None) == (error is None)
+    assert [is_kept_encrypted(file) for file in fits.glob("*.safetensors")] == [True]

@@ -6,6 +6,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from glovecal_client.encryption.key_file import settle_encryption
+from glovecal_client.errors import BadEncryptionKey
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import Task
@@ -33,13 +35,14 @@ def run_task(task: Task, folder: Path, cancel_file: Path, progress_file: Path) -
     progress = ProgressFile(progress_file)
     cancelled = CancelFile(cancel_file)
     try:
+        settle_encryption(folder.parent)  # a worker elsewhere may not know of the key
         if finished.get(task.key) is None:
             if cancelled():
                 raise Cancelled("stopped before it began")
             finished.put(task.key, task.function(task.payload, cancelled, progress.write))
     except Cancelled:
         return TaskOutcome(task.key, time.perf_counter() - began, cancelled=True)
-    except GlovecalError as error:
+    except (GlovecalError, BadEncryptionKey) as error:
         return TaskOutcome(task.key, time.perf_counter() - began, error=f"{task.label}: {error}")
     finally:
         progress.remove()

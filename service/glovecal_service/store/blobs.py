@@ -21,7 +21,7 @@ from typing import Protocol
 import obstore
 import obstore.store
 
-from glovecal_client.encryption.kept_file import decrypted, encrypted
+from glovecal_client.encryption.kept_file import decrypted, encrypted, is_encrypting
 from glovecal_client.errors import DamagedFile
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_models.errors import BadInput, DamagedArtifact
@@ -216,20 +216,23 @@ class Artifacts:
     def put(self, content: bytes) -> str:
         """Keep ``content`` and return its sha256; once this returns it survives a power cut.
 
-        A file of that name that is damaged is replaced. Raises StorageFull.
+        A file of that name that is damaged, or plain where there is a key, is replaced. Raises StorageFull.
         """
         name = hashlib.sha256(content).hexdigest()
-        if self._read(name) != content:
+        kept = self._blobs.read(name)
+        is_sound = kept is not None and self._decrypted(name, kept) == content
+        if not is_sound or (kept == content and is_encrypting()):
             self._blobs.write(name, encrypted(content))
         return name
 
     def get(self, sha256: str) -> bytes:
         """The bytes of that name, verified. Raises NotFound, DamagedArtifact."""
-        content = self._read(check_sha256(sha256))
-        if content is None:
+        kept = self._blobs.read(check_sha256(sha256))
+        if kept is None:
             raise NotFound(
                 f"artifact {sha256} is missing from {self._blobs.place}; restore that file from a backup"
             )
+        content = self._decrypted(sha256, kept)
         found = hashlib.sha256(content).hexdigest()
         if found != sha256:
             raise DamagedArtifact(
@@ -238,13 +241,12 @@ class Artifacts:
             )
         return content
 
-    def _read(self, sha256: str) -> bytes | None:
-        """Decrypted; what was changed comes as it lies there, and has another sha256."""
-        content = self._blobs.read(sha256)
+    def _decrypted(self, sha256: str, kept: bytes) -> bytes:
+        """What was changed comes as it lies there, and has another sha256."""
         try:
-            return content if content is None else decrypted(content, f"artifact {sha256}")
+            return decrypted(kept, f"artifact {sha256}")
         except DamagedFile:
-            return content
+            return kept
 
     def verify(self, sha256: str) -> None:
         """As ``get``, without reading again what was sound some minutes ago and is not changed since."""
