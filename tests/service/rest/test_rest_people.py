@@ -16,9 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glovecal_service.rest.app import create_app
-from glovecal_service.rest.http import guesses
-from glovecal_service.rest.http.guesses import Guesses, Pauses
+from glovecal_service.rest.http import guesses, pauses
+from glovecal_service.rest.http.guesses import Guesses
 from glovecal_service.rest.http.observation import SESSION_COOKIE
+from glovecal_service.rest.http.pauses import Pauses
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.rest.in_process import PortalTransport
 from glovecal_service.settings import Settings
@@ -176,17 +177,17 @@ def test_wrong_passwords_are_slowed_and_tell_nothing_of_who_there_is(asked: Aske
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=80))
 def test_of_wrong_ones_pass_a_handful_and_then_one_a_pause(steps_s: list[float]) -> None:
     at_s = 1000.0
-    pauses = Pauses(5.0, lambda: at_s)
+    paces = Pauses(5.0, guesses.AT_ONCE, lambda: at_s)
     passed = 0
     for step_s in steps_s:
         at_s += step_s
-        if pauses.wait_s("anna") == 0.0:
-            pauses.count("anna")
+        if paces.wait_s("anna") == 0.0:
+            paces.count("anna")
             passed += 1
         else:
-            assert pauses.wait_s("anna") <= 5.0, "nobody waits longer"
+            assert paces.wait_s("anna") <= 5.0, "nobody waits longer"
     assert passed <= guesses.AT_ONCE + (at_s - 1000.0) / 5.0
-    assert pauses.wait_s("ben") == 0.0
+    assert paces.wait_s("ben") == 0.0
 
 
 def in_a_loop(work: Callable[[], object]) -> None:
@@ -226,7 +227,8 @@ def test_an_address_is_slowed_whatever_names_it_guesses() -> None:
 
 
 def test_what_is_remembered_of_guesses_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guesses, "MOST_REMEMBERED", 20)
+    for part in (guesses, pauses):
+        monkeypatch.setattr(part, "MOST_REMEMBERED", 20)
 
     async def work() -> None:
         limit = Guesses(lambda: 0.0)

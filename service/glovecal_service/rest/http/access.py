@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from glovecal_client.site.roles import Role, includes
 from glovecal_service.plain import plain_text
+from glovecal_service.rest.http.fair_share import FairShare
 from glovecal_service.rest.http.observation import PREFIX, SESSION_COOKIE, STUDIO
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.rest.http.request_guard import SAFE_METHODS
@@ -76,6 +77,7 @@ class AccessGuard:
         """``is_asked``: whether anybody has to prove who they are."""
         self.app = app
         self.is_asked = is_asked
+        self._share = FairShare()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -98,10 +100,12 @@ class AccessGuard:
             state["actor"] = replace(asking, name=record.name, subjects=subjects)
             feed = FEED.fullmatch(path)
             seen_by = store.acting_as(state["actor"]).gloves
-            if feed is None or await run_in_threadpool(_is_seen, seen_by, feed[1]):
-                await self.app(scope, receive, send)
-                return
-            problem = Problem(404, "not-found", "There is no such glove.")
+            if feed is not None and not await run_in_threadpool(_is_seen, seen_by, feed[1]):
+                problem = Problem(404, "not-found", "There is no such glove.")
+            else:
+                problem = await self._answered(record.name, scope, receive, send)
+                if problem is None:
+                    return
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         elif record is None and method in SAFE_METHODS and not path.startswith(f"{PREFIX}/"):
@@ -109,6 +113,18 @@ class AccessGuard:
             await page(scope, receive, send)
         elif problem is not None:
             await problem.response(state.get("request_id"))(scope, receive, send)
+
+    async def _answered(self, who: str, scope: Scope, receive: Receive, send: Send) -> Problem | None:
+        """Why it was not."""
+        if scope["type"] == "websocket":  # stays open
+            await self.app(scope, receive, send)
+            return None
+        try:
+            async with self._share.turn(who, scope["path"]):
+                await self.app(scope, receive, send)
+        except Problem as problem:
+            return problem
+        return None
 
 
 def _is_seen(gloves: Gloves, glove: str) -> bool:

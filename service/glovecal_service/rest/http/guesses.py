@@ -19,43 +19,19 @@ from typing import TypeVar
 import anyio
 from anyio.to_thread import run_sync
 
+from glovecal_service.rest.http.pauses import MOST_REMEMBERED, Pauses
 from glovecal_service.rest.http.problem import Problem
 
 AT_ONCE = 10
 """Wrong passwords of a name, and of an address, before the first pause."""
 NAME_PAUSE_S, ADDRESS_PAUSE_S = 5.0, 30.0
 """Between two more."""
-MOST_REMEMBERED = 10_000
 CHECKED_AT_ONCE = 2
 """Each takes a processor and 64 MiB."""
 MOST_WAITING = 20
 IPV6_NETWORK_BITS = 64
 """What one subscriber has."""
 Answer = TypeVar("Answer")
-
-
-class Pauses:
-    """By whom, when what they did would be forgotten; the oldest go first where there are too many."""
-
-    def __init__(self, pause_s: float, clock: Callable[[], float]) -> None:
-        self._pause_s = pause_s
-        self._clock = clock
-        self._free_at: OrderedDict[str, float] = OrderedDict()
-
-    def wait_s(self, who: str) -> float:
-        """How long until one more is let through; 0: now."""
-        ahead = self._free_at.get(who, 0.0) - self._clock()
-        return max(0.0, ahead - (AT_ONCE - 1) * self._pause_s)
-
-    def count(self, who: str) -> None:
-        self._free_at[who] = max(self._free_at.get(who, 0.0), self._clock()) + self._pause_s
-        self._free_at.move_to_end(who)
-        if len(self._free_at) > MOST_REMEMBERED:
-            self._free_at.popitem(last=False)
-
-    def take_back(self, who: str) -> None:
-        if who in self._free_at:
-            self._free_at[who] -= self._pause_s
 
 
 @dataclass
@@ -70,8 +46,8 @@ class Guesses:
     """Passwords that are checked, or wait for it."""
 
     def __post_init__(self) -> None:
-        self._names = Pauses(NAME_PAUSE_S, self.clock)
-        self._addresses = Pauses(ADDRESS_PAUSE_S, self.clock)
+        self._names = Pauses(NAME_PAUSE_S, AT_ONCE, self.clock)
+        self._addresses = Pauses(ADDRESS_PAUSE_S, AT_ONCE, self.clock)
 
     async def check(self, name: str, address: str, ask: Callable[[], Answer | None]) -> Answer | None:
         """What ``ask`` finds in a thread, None for a wrong password. Raises Problem 429 where it is too early

@@ -118,11 +118,12 @@ _MEANING = {
     415: "The body is of a type this does not read.",
     421: "The Host header names another computer.",
     422: "The request cannot be used; `errors` or `file`, `line`, `column` say where.",
+    429: "The same key or person asks too often; `Retry-After` says when to ask again.",
     500: "A stored file is damaged, or the service failed; details are in its log under `request_id`.",
     503: "The database does not answer, or the service is not ready.",
     507: "The disk is full; nothing was kept.",
 }
-_ANYWHERE = (401, 403, 404, 421, 422, 500, 503)
+_ANYWHERE = (401, 403, 404, 421, 422, 429, 500, 503)
 _CHANGING = (408, 413, 507)
 
 

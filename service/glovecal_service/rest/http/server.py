@@ -10,9 +10,13 @@ from typing import Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from glovecal_client.hosts import is_loopback
+
 HEADER_DEADLINE_S = 10.0
 """A connection that has not sent complete headers by then is closed (slow-header attacks)."""
 MOST_CONNECTIONS = 512
+MOST_OF_ONE_ADDRESS = 256
+"""One computer keeps nobody else out, unless it is this one: a page's parts ask from here."""
 
 
 class PatientH11Protocol(H11Protocol):
@@ -24,10 +28,17 @@ class PatientH11Protocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         _send_at_once(transport)
-        if len(self.connections) > MOST_CONNECTIONS:
+        if len(self.connections) > MOST_CONNECTIONS or self._is_one_too_many():
             transport.abort()
             return
         self._deadline = self.loop.call_later(self.header_deadline_s, self._give_up)
+
+    def _is_one_too_many(self) -> bool:
+        address = self.client[0] if self.client else ""
+        if len(self.connections) <= MOST_OF_ONE_ADDRESS or is_loopback(address):
+            return False
+        clients = (getattr(each, "client", None) for each in self.connections)
+        return sum(client is not None and client[0] == address for client in clients) > MOST_OF_ONE_ADDRESS
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
