@@ -5,10 +5,12 @@ REST client is in a module of its own and needs the extra ``[rest]``.
 """
 
 from glovecal_client.errors import (
+    BadEncryptionKey,
     BadName,
     BadOption,
     CaptureRefused,
     ClientError,
+    DamagedFile,
     DamagedLog,
     DeviceError,
     DeviceFinished,
@@ -39,10 +41,12 @@ __all__ = [
     "DEFAULT_ENDPOINT",
     "FRAME_ENCODING",
     "POSE_ENCODING",
+    "BadEncryptionKey",
     "BadName",
     "BadOption",
     "CaptureRefused",
     "ClientError",
+    "DamagedFile",
     "DamagedLog",
     "DeviceError",
     "DeviceFinished",
