@@ -74,6 +74,7 @@ NAVIGATION = {
         "docs/deploy",
         "docs/keys",
         "docs/security",
+        "docs/privacy",
     ],
     "Reference": [
         "Commands <docs/commands>",
