@@ -6,13 +6,13 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
-from realtime_support import LAYOUT, SteadyDevice, free_endpoint
+from realtime_support import LAYOUT, SteadyDevice, eventually, free_endpoint
 
-from glovecal_client import Frame, FrameLog, encode_frame
+from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
@@ -72,6 +72,21 @@ def logged(settings: Settings) -> list[Path]:
     """Oldest first."""
     logs = (settings.data / "captured" / "capture" / "lab" / GLOVE).glob("*.glvlog")
     return sorted(logs, key=lambda log: log.stat().st_mtime_ns)
+
+
+def in_logs(settings: Settings) -> int:
+    """Frames that capture has logged."""
+    count = 0
+    for log in logged(settings):
+        with suppress(DamagedLog):  # its header is being written
+            count += len(list(Recording.open(log).payloads()))
+    return count
+
+
+def goes_on(settings: Settings, frames: int) -> None:
+    """Wait until capture has logged so many more: a busy computer has them later."""
+    before = in_logs(settings)
+    eventually(lambda: in_logs(settings) >= before + frames, f"{frames} more frames")
 
 
 def replay_source(folder: Path) -> Path:

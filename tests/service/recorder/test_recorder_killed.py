@@ -13,6 +13,7 @@ from recorder_support import (
     GLOVE,
     capture_process,
     capturing,
+    goes_on,
     logged,
     recording_thread,
 )
@@ -57,20 +58,20 @@ def check_law(settings: Settings, record: RecordingRecord, stopped_ns: int) -> N
     assert facts["sent"] == facts["recorded"] + facts["missing_frames"] == len(recorded) + len(missing)
 
 
-@pytest.mark.parametrize(("recorded_s", "away_s"), [(0.0, 0.0), (0.5, 0.4)])
+@pytest.mark.parametrize(("recorded", "away"), [(0, 0), (100, 80)])
 def test_stopped_while_the_recorder_is_away(
-    settings: Settings, store: Store, recorded_s: float, away_s: float
+    settings: Settings, store: Store, recorded: int, away: int
 ) -> None:
     with open_router([settings.zenoh]), capturing(settings):
         with part_of_service(recorder, settings) as process:
             id = begun(store, "killed")
-            time.sleep(recorded_s)
+            goes_on(settings, recorded)
             process.kill()
             process.join()
-        time.sleep(away_s)
+        goes_on(settings, away)
         stopped_ns = time.time_ns()
         store.recordings.stop(id)
-        time.sleep(0.3)
+        goes_on(settings, 60)
         with recording_thread(settings):
             record = settled(store, id)
     check_law(settings, record, stopped_ns)
@@ -92,17 +93,17 @@ def test_while_capture_is_away_too_it_is_incomplete_and_repaired_as_soon_as_it_i
         with capture_process(settings) as capture:
             with part_of_service(recorder, settings) as process:
                 id = begun(store, "both killed")
-                time.sleep(0.4)
+                goes_on(settings, 80)
                 process.kill()
                 process.join()
-            time.sleep(0.3)
+            goes_on(settings, 60)
             kill(capture)
         with capture_process(settings) as capture:
             eventually(lambda: len(logged(settings)) == 2, "a second run")
-            time.sleep(0.3)
+            goes_on(settings, 60)
             stopped_ns = time.time_ns()
             store.recordings.stop(id)
-            time.sleep(0.3)
+            goes_on(settings, 60)
             kill(capture)
         with recording_thread(settings):
             eventually(lambda: store.recordings.get(id).state == "repairing", "it says so")
@@ -130,7 +131,7 @@ def test_capture_that_ended_by_itself_leaves_a_complete_take(settings: Settings,
     with open_router([settings.zenoh]), recording_thread(settings):
         with capturing(settings):
             id = begun(store, "ended")
-            time.sleep(0.3)
+            goes_on(settings, 60)
         stopped_ns = time.time_ns()
         store.recordings.stop(id)
         eventually(lambda: store.recordings.get(id).state == "repairing", "capture's log to compare with")
@@ -148,10 +149,10 @@ def test_what_the_log_does_not_have_is_missing_for_good(settings: Settings, stor
         with capture_process(settings) as capture:
             with part_of_service(recorder, settings) as process:
                 id = begun(store, "log removed")
-                time.sleep(0.3)
+                goes_on(settings, 60)
                 process.kill()
                 process.join()
-            time.sleep(0.3)
+            goes_on(settings, 60)
             store.recordings.stop(id)
             kill(capture)
         logged(settings)[-1].unlink()

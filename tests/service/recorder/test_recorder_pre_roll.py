@@ -15,6 +15,7 @@ from recorder_support import (
     GLOVE,
     capture_process,
     capturing,
+    goes_on,
     logged,
     recording_thread,
 )
@@ -160,7 +161,7 @@ def test_it_ends_where_somebody_said_who_wears_the_glove(settings: Settings, sto
         store.subjects.create("ben")
         said_at = time.monotonic()
         store.gloves.assign(GLOVE, "ben", "after lunch")
-        time.sleep(0.5)
+        goes_on(settings, 100)
         asked = store.recordings.request(GLOVE, name="another wearing")
         recorded(store, asked.id, 50)
         record = finished(store, asked.id)

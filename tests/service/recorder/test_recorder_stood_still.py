@@ -19,7 +19,7 @@ from threading import Event
 
 import pytest
 from realtime_support import SteadyDevice, eventually, free_endpoint
-from recorder_support import GLOVE, capturing, logged, recording_thread
+from recorder_support import GLOVE, capturing, goes_on, logged, recording_thread
 
 from glovecal_client import Recording
 from glovecal_client.capture.device import Reading
@@ -116,9 +116,9 @@ def test_a_stop_asked_for_meanwhile_ends_the_recording_there(settings: Settings,
             eventually(looked, state)
 
         until("recording")
-        time.sleep(0.3)
+        goes_on(settings, 60)
         store.recordings.stop(asked.id)
-        time.sleep(0.7)
+        goes_on(settings, 400)
         until("done")
         stopping = Event()
         stopping.set()
@@ -127,7 +127,7 @@ def test_a_stop_asked_for_meanwhile_ends_the_recording_there(settings: Settings,
     frames = list(Recording.open(settings.recordings_folder / record.facts["file"]).frames())
     assert len(frames) == record.facts["recorded"] > 20
     late_s = max(frame.wall_ns for frame in frames) / 1e9 - record.facts[STOP_ASKED]
-    assert late_s < 0.3, "two clocks are compared by a question and its answer"
+    assert late_s < 1.0, "of two seconds; two clocks are compared by a question and its answer"
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from realtime_support import LAYOUT, WireGlove, eventually, part_of_service
-from recorder_support import GLOVE, capturing, recording_thread
+from recorder_support import GLOVE, capturing, goes_on, recording_thread
 
 from glovecal_client.session import open_client, open_router
 from glovecal_service.serve import recorder
@@ -100,7 +100,7 @@ def test_frames_missed_while_the_router_was_away_are_repaired(settings: Settings
         asked = store.recordings.request(GLOVE, name="outage")
         eventually(frames(store, asked.id, 60), "60 frames")
         router.close()
-        time.sleep(0.5)
+        goes_on(settings, 100)
         running.enter_context(open_router([settings.zenoh]))
         eventually(
             lambda: store.recordings.get(asked.id).facts.get("repaired", 0) > 50,
@@ -223,7 +223,7 @@ def test_a_full_disk_is_said_and_what_was_recorded_stays(
         asked = store.recordings.request(GLOVE, name="full")
         eventually(lambda: "frames wait in memory" in sentence(store, asked.id), "the sentence")
         assert re.search("no room|No space left", sentence(store, asked.id))
-        time.sleep(0.5)
+        goes_on(settings, 100)
         store.recordings.stop(asked.id)
         record = finished(store, asked.id)
         assert record.state == "repairing"
