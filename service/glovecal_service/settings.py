@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import re
+import stat
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
+from urllib.parse import urlsplit
 
 from pydantic import Field, ValidationInfo, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from glovecal_client.hosts import is_loopback
+from glovecal_client.operating_system import HAS_FILE_MODES
+from glovecal_client.private_files import OTHERS
+from glovecal_client.site.roles import ROLES, Role
+from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier
 
 if TYPE_CHECKING:
@@ -16,6 +25,8 @@ if TYPE_CHECKING:
 
 
 _HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
+LONGEST_ISSUER = 255
+_LONGEST_SECRET = 4096
 
 
 class Settings(BaseSettings):
@@ -54,6 +65,17 @@ class Settings(BaseSettings):
     scheduler: str | None = None
     """Address ``tls://HOST:PORT`` of a Dask scheduler whose workers share ``data``; None: workers of our own,
     started when they are needed."""
+    oidc_client_id: str = ""
+    oidc_secret_file: Path | None = None
+    """File with the secret that the provider gave this service; None: it gave none (a public client)."""
+    oidc_claim: str = "groups"
+    """The claim whose values say what somebody may do."""
+    oidc_roles: Annotated[Mapping[str, Role], NoDecode] = Field(default_factory=dict)
+    """Which role a value of the claim gives: ``animators=operator,leads=admin``."""
+    oidc_name: str = ""
+    """What the login page calls the provider; "": the host of its address."""
+    oidc_issuer: str = ""
+    """Address of the provider of OpenID Connect whose people may log in; "": nobody's."""
     log_names: bool = True
     """Whether lines of the log may name people, gloves and takes."""
     studio: bool = True
@@ -62,10 +84,10 @@ class Settings(BaseSettings):
     keep_days: Annotated[float, Field(gt=0, le=36500)] = 90.0
     """How long uploads that no take came from, films and ledgers of recordings that became takes are kept."""
 
-    @field_validator("site_file", mode="before")
+    @field_validator("site_file", "oidc_secret_file", mode="before")
     @classmethod
-    def _nothing_is_no_file(cls, site_file: Any) -> Any:
-        return site_file or None
+    def _nothing_is_no_file(cls, file: Any) -> Any:
+        return file or None
 
     @field_validator("allowed_hosts")
     @classmethod
@@ -94,6 +116,51 @@ class Settings(BaseSettings):
                 problem = "is not set" if file is None else f"is {str(file)!r}, which is no file"
                 raise ValueError(f"it needs a PEM file in GLOVECAL_{name.upper()}, but that {problem}")
         return scheduler
+
+    @field_validator("oidc_secret_file")
+    @classmethod
+    def _secret_can_be_read(cls, file: Path | None) -> Path | None:
+        if file is not None:
+            _read_secret(file)
+        return file
+
+    @field_validator("oidc_roles", mode="before")
+    @classmethod
+    def _values_give_roles(cls, text: Any) -> Any:
+        if not isinstance(text, str):
+            return text
+        roles: dict[str, Role] = {}
+        for part in filter(None, (each.strip() for each in text.split(","))):
+            value, _, name = (each.strip() for each in part.rpartition("="))
+            role: Role | None = next((each for each in ROLES if each == name), None)
+            if role is None or not value:
+                raise ValueError(
+                    f"{part!r} gives no role; write VALUE=ROLE, separated by commas, such as "
+                    f"animators=operator,leads=admin, with the roles {', '.join(ROLES)}"
+                )
+            roles[value] = role
+        return roles
+
+    @field_validator("oidc_issuer")
+    @classmethod
+    def _provider_is_known(cls, issuer: str, info: ValidationInfo) -> str:
+        """Whoever could answer in the provider's place could make themselves an admin."""
+        if not issuer:
+            return issuer
+        if not is_safe_address(issuer) or len(issuer) > LONGEST_ISSUER or {"?", "#", "@"} & set(issuer):
+            raise ValueError("give the provider's address, https://HOST (http:// on this computer only)")
+        for name in ("oidc_client_id", "oidc_claim", "oidc_roles"):
+            if name in info.data and not info.data[name]:
+                raise ValueError(f"people of that provider log in only with GLOVECAL_{name.upper()}, too")
+        return issuer
+
+    @property
+    def oidc_secret(self) -> str:
+        """ "" where there is none. Raises BadInput."""
+        try:
+            return "" if self.oidc_secret_file is None else _read_secret(self.oidc_secret_file)
+        except ValueError as error:
+            raise BadInput(f"GLOVECAL_OIDC_SECRET_FILE: {error}") from error
 
     @property
     def database_url(self) -> str | URL:
@@ -131,3 +198,28 @@ class Settings(BaseSettings):
     @property
     def upload_limit_bytes(self) -> int:
         return self.upload_limit_mb * 1_000_000
+
+
+def is_safe_address(address: str) -> bool:
+    """Whether nobody on the way can read or change what is exchanged with this http(s) address."""
+    try:
+        parts = urlsplit(address)
+        host = parts.hostname or ""
+    except ValueError:
+        return False
+    return bool(host) and (parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host)))
+
+
+def _read_secret(file: Path) -> str:
+    """Raises ValueError, without the secret."""
+    try:
+        with file.open("rb") as stream:
+            mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
+            secret = stream.read(_LONGEST_SECRET + 1).decode("ascii", "replace").strip()
+    except OSError as error:
+        raise ValueError(f"the file with the provider's secret cannot be read ({error.strerror})") from error
+    if HAS_FILE_MODES and mode & OTHERS:
+        raise ValueError(f"others on this computer may use the secret in it (mode {mode:o}): chmod 600 it")
+    if not secret.isprintable() or not secret.isascii() or not 0 < len(secret) <= _LONGEST_SECRET:
+        raise ValueError("the file must hold the secret that the provider gave, in one line")
+    return secret

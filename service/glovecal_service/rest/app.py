@@ -22,7 +22,7 @@ from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.logs import Word
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.rest import asking
-from glovecal_service.rest.access import audit, keys, login, people
+from glovecal_service.rest.access import audit, keys, login, people, provider_login
 from glovecal_service.rest.effect import (
     catalogue,
     picture,
@@ -45,6 +45,7 @@ from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
 from glovecal_service.rest.http.problem import install_openapi
+from glovecal_service.rest.http.provider import Provider
 from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who
 from glovecal_service.rest.http.temporary_folder import sweep_temporary_folders
 from glovecal_service.rest.http.upload_folder import UploadFolder
@@ -156,9 +157,10 @@ def create_app(
         await run_in_threadpool(uploads_folder.sweep)
         await run_in_threadpool(sweep_temporary_folders)
         await run_in_threadpool(finish_erasures, opened, settings)
+        provider = Provider(settings) if settings.oidc_issuer else None
         app.state.parts = Parts(
             settings, opened, uploads_folder, metrics, Predictors(opened), Filming(settings.films_folder),
-            CameraAccess(settings.zenoh), StreamedGlove(settings),
+            CameraAccess(settings.zenoh), StreamedGlove(settings), provider,
         )  # fmt: skip
         dispatcher = Dispatcher(opened, settings, ANSWERED, of_one_command=of_one_command)
         dispatcher.start()
@@ -171,6 +173,8 @@ def create_app(
             await run_in_threadpool(app.state.parts.cameras.close)
             await run_in_threadpool(app.state.parts.streamed_glove.stop)
             await run_in_threadpool(dispatcher.stop)
+            if provider is not None:
+                await provider.close()
             if store is None:
                 opened.close()
 
@@ -193,7 +197,12 @@ def create_app(
 
 
 def _routers() -> list[tuple[str, APIRouter]]:
-    return [("", health.pages), ("", login.router), *((PREFIX, noun.router) for noun in ROUTERS)]
+    return [
+        ("", health.pages),
+        ("", login.router),
+        ("", provider_login.router),
+        *((PREFIX, noun.router) for noun in ROUTERS),
+    ]
 
 
 @cache

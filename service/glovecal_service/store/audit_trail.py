@@ -29,7 +29,7 @@ WATCHED: Mapping[Table, tuple[str, ...]] = {
     tables.recordings: ("glove", "name", "subject"),
     tables.samplings: ("glove", "subject", "open"),
     tables.jobs: ("kind", "subject", "payload", "cancel_requested"),
-    tables.keys: ("role", "subjects", "revoked_at", "password_changed_at"),
+    tables.keys: ("role", "subjects", "revoked_at", "password_changed_at", "issuer"),
 }
 """Tables whose changes are written down, and of which columns."""
 LONGEST_VALUE = 300

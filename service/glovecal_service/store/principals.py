@@ -1,4 +1,5 @@
-"""Who may ask: a program or a person by a key, a person by a password; each has one name, role and scope.
+"""Who may ask: a program or a person by a key, a person by a password or by a provider's word; each has one
+name, role and scope.
 
 Names are never used again, so that the log of changes means one of them. Whatever changes of somebody ends
 their sessions.
@@ -33,7 +34,9 @@ class Principal:
     created_at: datetime
     revoked_at: datetime | None
     password_changed_at: datetime | None
-    """None: it has a key."""
+    """None: it has none."""
+    issuer: str | None
+    """The provider of OpenID Connect that says who it is, and gives its role; None: it proves that here."""
 
     @property
     def is_valid(self) -> bool:
@@ -41,7 +44,7 @@ class Principal:
 
     @property
     def is_person(self) -> bool:
-        return self.password_changed_at is not None
+        return self.password_changed_at is not None or self.issuer is not None
 
 
 class Principals:
@@ -69,8 +72,8 @@ class Principals:
 
     @property
     def has_admin(self) -> bool:
-        """Whether somebody could prove to be an admin."""
-        return any(each.is_valid and each.role == "admin" for each in self.list())
+        """Whether somebody could prove to be an admin, also while a provider is away."""
+        return any(each.is_valid and each.role == "admin" and each.issuer is None for each in self.list())
 
     def _add(
         self, name: str, role: Role, subjects: Sequence[str] | None, proof: Mapping[str, Any]
@@ -123,5 +126,5 @@ def principal_of(values: Mapping[str, Any]) -> Principal:
     subjects = values["subjects"]
     return Principal(
         values["name"], values["role"], None if subjects is None else tuple(subjects), values["created_at"],
-        values["revoked_at"], values["password_changed_at"],
+        values["revoked_at"], values["password_changed_at"], values["issuer"],
     )  # fmt: skip

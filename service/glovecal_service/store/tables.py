@@ -329,10 +329,14 @@ keys = Table(
     Column("revoked_at", UtcTime),
     Column("password", Text),
     Column("password_changed_at", UtcTime),
+    Column("issuer", Text),
+    Column("issuer_sub", Text),
     Column("row_sha256", SHA256, nullable=False),
     UniqueConstraint("sha256"),
+    UniqueConstraint("issuer", "issuer_sub", name="keys_issuer_issuer_sub_key"),
 )
-"""Of a key ``sha256``, of a person ``password`` (PHC format)."""
+"""Of a key ``sha256``, of a person ``password`` (PHC format), or who they are to a provider of OpenID Connect
+(claims ``iss`` and ``sub``)."""
 
 sessions = Table(
     "sessions",

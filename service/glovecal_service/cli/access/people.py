@@ -1,4 +1,4 @@
-"""``glovecal person``: who logs in with a name and a password."""
+"""``glovecal person``: who logs in with a name and a password, or at a provider of OpenID Connect."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from glovecal_service.rest.access.answer import Person
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
-app = typer.Typer(help="People who log in with a password.", no_args_is_help=True)
+app = typer.Typer(help="People who log in.", no_args_is_help=True)
 Name = Annotated[str, typer.Argument(help="Of the person.")]
 
 
@@ -51,6 +51,7 @@ def list_people(as_json: AsJson = False) -> None:
         "name": "person",
         **SCOPE_COLUMNS,
         "password_changed_at": "password set",
+        "issuer": "logs in at",
         "revoked_at": "removed",
     }
     empty = "Nobody yet. Add somebody: glovecal person add NAME --role operator"

@@ -24,7 +24,11 @@ class NewKey(Key):
 
 
 class Person(Key):
-    password_changed_at: datetime
+    password_changed_at: datetime | None = Field(description="Null: the password is kept elsewhere.")
+    issuer: str | None = Field(
+        description="The provider of OpenID Connect that says who this is and gives the role; null: they "
+        "log in with a password."
+    )
 
 
 class AuditRow(Row):

@@ -6,14 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from html import escape
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlencode
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_models.errors import BadInput
-from glovecal_service.rest.http.access import LOGIN, session_token
+from glovecal_service.rest.http.access import BY_PROVIDER, LOGIN, session_token
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded, StoreNeeded
 from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 from glovecal_service.rest.http.problem import Problem
@@ -38,6 +38,9 @@ input, button { font: inherit; padding: .6rem; width: 100%; box-sizing: border-b
 label { display: block; margin-top: .8rem; }
 button { margin-top: 1rem; min-height: 2.75rem; }
 a { color: LinkText; }
+a.button { display: block; box-sizing: border-box; min-height: 2.75rem; padding: .6rem; text-align: center;
+  border: 1px solid ButtonBorder; border-radius: .25rem; background: ButtonFace; color: ButtonText;
+  text-decoration: none; }
 form + form { border-top: 1px solid GrayText; margin-top: 2rem; padding-top: .8rem; }
 </style>
 <main>
@@ -75,8 +78,8 @@ _CHANGE = f"""<form method="post" action="/login/password">
 
 
 @router.get("")
-def show_login(page: str = "") -> HTMLResponse:
-    return _login_page("This service asks who you are.", page, 200)
+def show_login(parts: PartsNeeded, page: str = "") -> HTMLResponse:
+    return login_page(parts, "This service asks who you are.", page, 200)
 
 
 @router.post("")
@@ -91,15 +94,12 @@ async def log_in(request: Request, parts: PartsNeeded) -> Response:
             wrong = WRONG
             principal = await _person(request, parts, form)
     except Problem as problem:
-        return _login_page(problem.detail, page, problem.status, problem.headers)
+        return login_page(parts, problem.detail, page, problem.status, problem.headers)
     token = None if principal is None else await run_in_threadpool(parts.store.sessions.begin, principal)
     if token is None:
-        return _login_page(wrong, page, 401)
-    answer = RedirectResponse(_own(page), status_code=303)
-    answer.set_cookie(
-        SESSION_COOKIE, token, max_age=SESSION_HOURS * 3600, httponly=True, samesite="strict",
-        secure=request.url.scheme == "https",
-    )  # fmt: skip
+        return login_page(parts, wrong, page, 401)
+    answer = RedirectResponse(own_page(page), status_code=303)
+    keep_session(answer, request, token)
     return answer
 
 
@@ -134,7 +134,7 @@ async def change_password(request: Request, parts: PartsNeeded) -> Response:
         return _change_page(problem.detail, problem.status, problem.headers)
     except BadInput as error:
         return _change_page(f"Not changed: {error}.", 422)
-    return _login_page("The password is changed. Log in with the new one.", "", 200)
+    return login_page(parts, "The password is changed. Log in with the new one.", "", 200)
 
 
 async def _form(request: Request) -> dict[str, str]:
@@ -150,21 +150,38 @@ async def _person(request: Request, parts: Parts, form: dict[str, str]) -> Princ
     return await parts.guesses.check(name, request.state.actor.origin, ask)
 
 
-def _own(page: str) -> str:
+def keep_session(answer: Response, request: Request, token: str) -> None:
+    """In the browser that asked."""
+    answer.set_cookie(
+        SESSION_COOKIE, token, max_age=SESSION_HOURS * 3600, httponly=True, samesite="strict",
+        secure=request.url.scheme == "https",
+    )  # fmt: skip
+
+
+def own_page(page: str) -> str:
     """A page of the studio, else the front page; never another site's address."""
     return page if page.startswith(f"/{STUDIO}/") and "//" not in page and "\\" not in page else "/"
 
 
-def _login_page(sentence: str, page: str, status: int, headers: dict[str, str] | None = None) -> HTMLResponse:
-    forms = _LOGIN.replace("PAGE", escape(_own(page), quote=True))
-    return _page("log in", sentence, forms, status, headers)
+def login_page(
+    parts: Parts, sentence: str, page: str, status: int, headers: dict[str, str] | None = None
+) -> HTMLResponse:
+    forms = _LOGIN.replace("PAGE", escape(own_page(page), quote=True))
+    if parts.provider is not None:
+        there = f"{BY_PROVIDER}?{urlencode({'page': own_page(page)})}"
+        link = f'<a class="button" href="{escape(there)}">Log in with {escape(parts.provider.name)}</a>'
+        forms = f"<p>{link}</p>\n{forms}"
+    return plain_page("log in", sentence, forms, status, headers)
 
 
 def _change_page(sentence: str, status: int, headers: dict[str, str] | None = None) -> HTMLResponse:
-    return _page("change your password", sentence, _CHANGE, status, headers)
+    return plain_page("change your password", sentence, _CHANGE, status, headers)
 
 
-def _page(title: str, sentence: str, forms: str, status: int, headers: dict[str, str] | None) -> HTMLResponse:
+def plain_page(
+    title: str, sentence: str, forms: str, status: int, headers: dict[str, str] | None
+) -> HTMLResponse:
+    """``forms`` is HTML, the rest is text."""
     text = _PAGE.replace("TITLE", title).replace("SENTENCE", escape(sentence)).replace("FORMS", forms)
     kept = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store", **(headers or {})}
     return HTMLResponse(text, status_code=status, headers=kept)

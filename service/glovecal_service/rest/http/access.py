@@ -32,8 +32,9 @@ from glovecal_service.store.store import Store
 FEED = re.compile(rf"/{STUDIO}/feed/([^/]+)")
 """Of a page that draws a glove's hand: poses, which no statement of the store narrows."""
 LOGIN = "/login"
+BY_PROVIDER = f"{LOGIN}/oidc"
 LONGEST_ACTION = 200
-OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}(/password)?")
+OPEN = re.compile(rf"{PREFIX}/health/(live|ready)|{LOGIN}(/password)?|{BY_PROVIDER}(/callback)?")
 """What answers to everybody: it tells nothing of what is stored."""
 _ASKED_BY_POST = (
     r"models/[^/]+/(compare|where|explain|predict|replay|series|residual|report|calibration-report"
@@ -174,6 +175,11 @@ def _problem(record: Principal | None, method: str, path: str) -> Problem | None
 
 
 def _too_low(record: Principal, needed: Role) -> str:
+    if record.issuer is not None:
+        return (
+            f"{record.name} has the role {record.role}, by the login at {record.issuer}; this needs "
+            f"{needed}. An admin changes that there, or in GLOVECAL_OIDC_ROLES."
+        )
     if record.is_person:
         return (
             f"{record.name} has the role {record.role}; this needs {needed}. An admin changes that, as in: "

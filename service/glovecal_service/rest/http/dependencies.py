@@ -14,6 +14,7 @@ from glovecal_service.first_run.simulated_glove import StreamedGlove
 from glovecal_service.questions.at_once import Predictors
 from glovecal_service.rest.http.guesses import Guesses
 from glovecal_service.rest.http.observation import Metrics
+from glovecal_service.rest.http.provider import Provider
 from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -36,6 +37,8 @@ class Parts:
     filming: Filming
     cameras: CameraAccess
     streamed_glove: StreamedGlove
+    provider: Provider | None
+    """Whose people may log in beside those who are known here."""
     import_slots: anyio.CapacityLimiter = field(
         default_factory=lambda: anyio.CapacityLimiter(IMPORTS_AT_ONCE)
     )

@@ -1,10 +1,11 @@
-"""People who log in, on the page of keys: who may do what, with a name and a password."""
+"""People who log in, on the page of keys: who may do what, with a password or by a provider."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import get_args
+from urllib.parse import urlsplit
 
 from nicegui import ui
 
@@ -53,7 +54,10 @@ class PeopleTable:
     def __init__(self, service: Service, subjects: list[str], changed: Callable[[], Awaitable[None]]) -> None:
         self._service, self._changed = service, changed
         heading(2, "People")
-        ui.label("Whoever is here logs in to the studio with a name and a password, and changes it there.")
+        ui.label(
+            "Whoever is here logs in to the studio with a name and a password, and changes it there. People "
+            "of a provider are here once they logged in; it gives their role."
+        )
         with ui.row().classes("choices"):
             self._name = ui.input("Name of the person")
             self._scope = ScopeChoice(subjects)
@@ -81,7 +85,7 @@ class PeopleTable:
             if not people:
                 ui.label("Nobody yet.")
                 return
-            with table("People", ("Person", "Role", "Of", "Password set", "")):
+            with table("People", ("Person", "Role", "Of", "Proof", "")):
                 for person in people:
                     self._row(person)
 
@@ -90,7 +94,7 @@ class PeopleTable:
             row_head(person.name)
             cell(person.role)
             cell(whose(person))
-            cell(moment(person.password_changed_at))
+            cell(_proof(person))
             with ui.element("td"):
                 if person.revoked_at is None:
                     act(f"Change {person.name}", partial(self._open, person))
@@ -103,6 +107,7 @@ class PeopleTable:
         self._whom.set_text(f"Change {person.name}")
         self._new_scope.show(person)
         self._new_password.set_value("")
+        self._new_password.set_visibility(person.issuer is None)
         self._dialog.open()
 
     async def _add(self) -> None:
@@ -132,6 +137,12 @@ class PeopleTable:
             await self._service.delete(f"/people/{name}")
             self._message.set_text(f"{name} is removed, and logs in no more.")
             await self._changed()
+
+
+def _proof(person: Person) -> str:
+    if person.password_changed_at is None:
+        return f"login at {urlsplit(person.issuer or '').hostname}"
+    return f"password of {moment(person.password_changed_at)}"
 
 
 def _password_input(label: str) -> ui.input:
