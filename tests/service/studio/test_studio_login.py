@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from dropping import LATE_S, drop, motion_file, takes_without_angles
+from oidc_providers import CLIENT, SECRET, others_provider
 from playwright.sync_api import Browser, expect
 from realtime_support import free_endpoint, part_of_service, store_model
 from studio_support import PATIENCE_MS, Open, serious
@@ -146,6 +147,47 @@ def test_a_name_and_a_password_are_typed_and_the_password_is_changed(
     page.get_by_role("button", name="Log out").click()
     expect(page).to_have_url(f"{address}/login?page=/studio/start")
     context.close()
+
+
+def test_who_proves_at_a_provider_who_they_are_comes_back_to_the_page(
+    browser: Browser, tmp_path: Path
+) -> None:
+    """``localhost`` and ``127.0.0.1`` are two sites for a browser: cookies are those of a real provider."""
+    person = {"sub": "s-1", "preferred_username": "anna", "groups": ["leads"]}
+    port = int(free_endpoint().rpartition(":")[2])
+    secret = tmp_path / "secret"
+    secret.write_text(SECRET)
+    secret.chmod(0o600)
+    with others_provider("localhost", person) as issuer, ExitStack() as running:
+        settings = Settings(
+            data=tmp_path / "data", zenoh=free_endpoint(), port=port, workers=1, login="always",
+            oidc_issuer=issuer, oidc_client_id=CLIENT, oidc_secret_file=secret, oidc_roles={"leads": "admin"},
+            oidc_name="Our Company",
+        )  # fmt: skip
+        running.enter_context(part_of_service(web, settings))
+        address = f"http://127.0.0.1:{port}"
+        context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme="dark")
+        context.set_default_timeout(PATIENCE_MS)
+        page = context.new_page()
+        page.goto(f"{address}/studio/access")
+        expect(page).to_have_url(f"{address}/login?page=/studio/access")
+        assert serious(page) == []
+        page.get_by_role("link", name="Log in with Our Company").click()
+        page.get_by_role("button", name="s-1").click()
+        expect(page).to_have_url(f"{address}/studio/access")
+        expect(page.get_by_role("cell", name="login at localhost")).to_be_visible()
+        page.get_by_role("button", name="Change anna").click()
+        dialog = page.get_by_role("dialog", name="Change a person")
+        expect(dialog.get_by_label("Role")).to_be_visible()
+        expect(dialog.get_by_label("New password")).to_be_hidden()
+        dialog.get_by_role("button", name="Cancel").click()
+        page.get_by_role("button", name="Remove anna").click()
+        expect(page.get_by_text("This service asks who you are").first).to_be_visible()
+        page.goto(f"{address}/studio/access")
+        page.get_by_role("link", name="Log in with Our Company").click()
+        page.get_by_role("button", name="s-1").click()
+        expect(page.get_by_role("alert")).to_contain_text("anna was removed by an admin")
+        context.close()
 
 
 def test_an_admin_adds_changes_and_removes_people(opened: Open) -> None:
