@@ -172,3 +172,47 @@ def test_keys_of_the_schema_before_people_still_open(store_settings: Settings) -
         store.people.create("anna", "viewer", password=PASSWORD)
         with pytest.raises(Conflict):
             store.keys.create("lena", "viewer")
+
+
+def test_people_with_passwords_of_the_schema_before_providers_still_log_in(store_settings: Settings) -> None:
+    database = Database(store_settings.database_url)
+    store_settings.data.mkdir(parents=True, exist_ok=True)
+    config = migrate._config(schema.migrations())
+    with database.write() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0010")
+    elsewhere = store_settings.model_copy(update={"data": store_settings.data / "new", "database": None})
+    with Store.open(elsewhere) as new:
+        anna = new.people.create("anna", "trainer", password=PASSWORD)
+        with new.database.read() as connection:
+            row = dict(connection.execute(select(tables.keys)).one()._mapping)
+    with database.write() as connection:
+        there = {name: value for name, value in row.items() if value is not None}
+        connection.execute(insert(tables.keys).values(**there))
+    database.close()
+    with Store.open(store_settings) as store:
+        assert store.people.of("anna", PASSWORD) == anna
+        assert store.people.let_in("ben", "viewer", issuer="https://a", sub="1").name == "ben"
+
+
+def test_a_person_of_a_provider_is_who_it_says_and_stays_so(store: Store) -> None:
+    store.keys.create("anna", "viewer")
+    name = store.people.name_of("https://a", "1", "Anna@studio.example")
+    assert name == "anna-2", "one name is one key or person"
+    anna = store.people.let_in(name, "operator", issuer="https://a", sub="1")
+    assert (anna.is_person, anna.password_changed_at, anna.issuer) == (True, None, "https://a")
+    assert store.people.name_of("https://a", "1", "Somebody else") == name
+    assert store.people.name_of("https://b", "1", "anna") == "anna-3", "another provider's is another person"
+    assert store.people.of(name, "") is None
+    token = store.sessions.begin(anna)
+    assert token is not None
+    assert store.people.let_in(name, "operator", issuer="https://a", sub="1") == anna
+    assert store.sessions.of(token) == anna
+    assert store.people.let_in(name, "admin", issuer="https://a", sub="1").role == "admin"
+    assert store.sessions.of(token) is None
+    assert not store.people.has_admin
+    with pytest.raises(Conflict):
+        store.people.let_in(name, "viewer", issuer="https://b", sub="1")
+    store.people.revoke(name)
+    with pytest.raises(BadInput, match="was removed by an admin"):
+        store.people.let_in(name, "viewer", issuer="https://a", sub="1")

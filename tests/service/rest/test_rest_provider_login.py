@@ -33,9 +33,13 @@ from oidc_providers import (
     signed_by_everybody,
 )
 
+from glovecal_client.operating_system import HAS_FILE_MODES
+from glovecal_models.errors import BadInput
+from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.rest.app import create_app
 from glovecal_service.rest.http import begun_logins, provider
 from glovecal_service.rest.http.observation import SESSION_COOKIE
+from glovecal_service.rest.http.provider import Provider
 from glovecal_service.rest.in_process import PortalTransport
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
@@ -319,9 +323,9 @@ def by_octets(claims: dict[str, Any]) -> str:
         ({"claims": {"azp": "another"}}, "proof for another service"),
         ({"claims": {"iss": "https://evil.example"}}, "no proof for this service"),
         ({"claims": {"iss": None}}, "no proof for this service"),
-        ({"claims": {"exp": 1_700_000_000}}, "sent a proof that is over"),
+        ({"claims": {"exp": 1_700_000_000}}, "sent a proof that is not of now"),
         ({"claims": {"exp": None}}, "no proof for this service"),
-        ({"claims": {"iat": 4_000_000_000}}, "no proof for this service"),
+        ({"claims": {"iat": 4_000_000_000}}, "sent a proof that is not of now"),
         ({"claims": {"sub": None}}, "no proof for this service"),
         ({"claims": {"sub": "x" * 300}}, "does not say who this is"),
         ({"claims": {"sub": "a\x00b"}}, "does not say who this is"),
@@ -494,6 +498,54 @@ def test_a_provider_that_is_not_there_is_told(tmp_path: Path) -> None:
         answer = asking.begin()
         assert answer.status_code == 503
         assert "Studio does not answer" in answer.text
+
+
+ISSUER = {"ISSUER": "https://login.example", "CLIENT_ID": "x", "ROLES": "leads=admin"}
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "sentence"),
+    [
+        ("ISSUER", "http://login.example", "give the provider's address, https://HOST"),
+        ("ISSUER", "login.example", "give the provider's address, https://HOST"),
+        ("ISSUER", "https://login.example/?a=b", "give the provider's address, https://HOST"),
+        ("ISSUER", "https://[", "give the provider's address, https://HOST"),
+        ("CLIENT_ID", "", "only with GLOVECAL_OIDC_CLIENT_ID"),
+        ("ROLES", "", "only with GLOVECAL_OIDC_ROLES"),
+        ("CLAIM", "", "only with GLOVECAL_OIDC_CLAIM"),
+        ("ROLES", "leads=boss", "'leads=boss' gives no role; write VALUE=ROLE"),
+        ("ROLES", "leads", "'leads' gives no role; write VALUE=ROLE"),
+        ("ROLES", "=admin", "'=admin' gives no role; write VALUE=ROLE"),
+        ("SECRET_FILE", "none", "cannot be read"),
+        ("SECRET_FILE", "open", "others on this computer may use the secret in it (mode 644): chmod 600 it"),
+        ("SECRET_FILE", "empty", "must hold the secret that the provider gave, in one line"),
+        ("SECRET_FILE", "lines", "must hold the secret that the provider gave, in one line"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, variable: str, value: str, sentence: str
+) -> None:
+    if value == "open" and not HAS_FILE_MODES:
+        pytest.skip("a file has no mode here")
+    monkeypatch.chdir(tmp_path)
+    for name, content, mode in (("open", SECRET, 0o644), ("empty", "\n", 0o600), ("lines", "a\nb", 0o600)):
+        Path(name).write_text(content)
+        Path(name).chmod(mode)
+    for name, right in (ISSUER | {variable: value}).items():
+        monkeypatch.setenv(f"GLOVECAL_OIDC_{name}", right)
+    with pytest.raises(BadInput) as refused:
+        settings_of_environment()
+    assert str(refused.value).startswith("GLOVECAL_OIDC_")
+    assert sentence in str(refused.value)
+    assert SECRET not in str(refused.value)
+
+
+def test_settings_are_read_as_they_are_meant(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, right in (ISSUER | {"ROLES": "lead animators=operator, cn=leads=admin,"}).items():
+        monkeypatch.setenv(f"GLOVECAL_OIDC_{name}", right)
+    settings = settings_of_environment()
+    assert settings.oidc_roles == {"lead animators": "operator", "cn=leads": "admin"}
+    assert Provider(settings).name == "login.example"
 
 
 def test_without_a_provider_there_is_no_button_and_no_way(tmp_path: Path) -> None:

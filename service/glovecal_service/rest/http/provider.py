@@ -20,7 +20,7 @@ from urllib.parse import quote, urlencode, urlsplit
 import anyio
 import httpx
 import jwt
-from jwt.exceptions import ExpiredSignatureError, PyJWTError
+from jwt.exceptions import ExpiredSignatureError, ImmatureSignatureError, PyJWTError
 
 from glovecal_client.site.roles import ROLES, Role
 from glovecal_service.rest.http.begun_logins import Begun, BegunLogins
@@ -164,8 +164,10 @@ class Provider:
                 token, key, algorithms=ALGORITHMS, audience=self._settings.oidc_client_id, issuer=self.issuer,
                 leeway=CLOCKS_DIFFER_S, options={"require": ["exp", "iat", "iss", "aud", "sub"]},
             )  # fmt: skip
-        except ExpiredSignatureError as error:
-            raise self._wrong("sent a proof that is over; begin again, and have both clocks set") from error
+        except (ExpiredSignatureError, ImmatureSignatureError) as error:
+            raise self._wrong(
+                "sent a proof that is not of now; begin again, or have both clocks set"
+            ) from error
         except (PyJWTError, ValueError, TypeError, AttributeError) as error:
             raise self._wrong(
                 "sent no proof for this service, signed by it; an admin compares the GLOVECAL_OIDC settings "
