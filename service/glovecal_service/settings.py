@@ -17,7 +17,7 @@ from glovecal_client.hosts import is_loopback
 from glovecal_client.operating_system import HAS_FILE_MODES
 from glovecal_client.private_files import OTHERS
 from glovecal_client.site.roles import ROLES, Role
-from glovecal_models.errors import BadInput
+from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.names import check_identifier
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
 LONGEST_ISSUER = 255
 _LONGEST_SECRET = 4096
+_SECRET_FILE = "GLOVECAL_OIDC_SECRET_FILE"
 
 
 class Settings(BaseSettings):
@@ -157,10 +158,7 @@ class Settings(BaseSettings):
     @property
     def oidc_secret(self) -> str:
         """ "" where there is none. Raises BadInput."""
-        try:
-            return "" if self.oidc_secret_file is None else _read_secret(self.oidc_secret_file)
-        except ValueError as error:
-            raise BadInput(f"GLOVECAL_OIDC_SECRET_FILE: {error}") from error
+        return "" if self.oidc_secret_file is None else _read_secret(self.oidc_secret_file)
 
     @property
     def database_url(self) -> str | URL:
@@ -211,15 +209,17 @@ def is_safe_address(address: str) -> bool:
 
 
 def _read_secret(file: Path) -> str:
-    """Raises ValueError, without the secret."""
+    """Raises BadInput, without the secret."""
     try:
         with file.open("rb") as stream:
             mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
             secret = stream.read(_LONGEST_SECRET + 1).decode("ascii", "replace").strip()
     except OSError as error:
-        raise ValueError(f"the file with the provider's secret cannot be read ({error.strerror})") from error
+        raise BadInput(f"{_SECRET_FILE}: the file cannot be read ({reason_of(error)})") from error
     if HAS_FILE_MODES and mode & OTHERS:
-        raise ValueError(f"others on this computer may use the secret in it (mode {mode:o}): chmod 600 it")
+        raise BadInput(
+            f"{_SECRET_FILE}: others on this computer may use the secret in it (mode {mode:o}): chmod 600 it"
+        )
     if not secret.isprintable() or not secret.isascii() or not 0 < len(secret) <= _LONGEST_SECRET:
-        raise ValueError("the file must hold the secret that the provider gave, in one line")
+        raise BadInput(f"{_SECRET_FILE}: the file must hold the secret that the provider gave, in one line")
     return secret

@@ -468,7 +468,7 @@ def test_a_provider_that_is_away_or_slow_stops_nobody_else(
     asking: Service, liar: LyingProvider, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the suite it is given less time than the 8 s of a user."""
-    assert provider.PROVIDER_PATIENCE_S < 10
+    assert provider.PROVIDER_TIMEOUT_S < 10
     go_on = Event()
 
     def dripping(request: BaseHTTPRequestHandler) -> None:
@@ -481,7 +481,7 @@ def test_a_provider_that_is_away_or_slow_stops_nobody_else(
     liar.answers["/.well-known/openid-configuration"] = dripping
     with ExitStack() as waiting:
         waiting.callback(go_on.set)
-        monkeypatch.setattr(provider, "PROVIDER_PATIENCE_S", 1.0)
+        monkeypatch.setattr(provider, "PROVIDER_TIMEOUT_S", 1.0)
         slow = asking.begin()
         assert slow.status_code == 503
         assert "Studio does not answer. Try again later; keys and passwords are taken" in slow.text

@@ -27,7 +27,7 @@ from glovecal_service.rest.http.begun_logins import Begun, BegunLogins
 from glovecal_service.rest.http.problem import Problem
 from glovecal_service.settings import Settings, is_safe_address
 
-PROVIDER_PATIENCE_S = 8.0
+PROVIDER_TIMEOUT_S = 8.0
 """For all that is asked of the provider for one page."""
 LARGEST_ANSWER = 256_000
 """Bytes."""
@@ -64,7 +64,7 @@ class Provider:
         self._kept: dict[str, tuple[float, dict[str, Any]]] = {}
         self._http = httpx.AsyncClient(
             limits=httpx.Limits(max_connections=ASKED_AT_ONCE),
-            timeout=PROVIDER_PATIENCE_S,
+            timeout=PROVIDER_TIMEOUT_S,
             headers={"Accept": "application/json", "Accept-Encoding": "identity"},
         )
 
@@ -107,7 +107,7 @@ class Provider:
     async def _in_time(self) -> AsyncIterator[None]:
         """Raises Problem for what does not come, or comes too slowly."""
         try:
-            with anyio.fail_after(PROVIDER_PATIENCE_S):
+            with anyio.fail_after(PROVIDER_TIMEOUT_S):
                 yield
         except (TimeoutError, httpx.HTTPError, httpx.InvalidURL) as error:
             raise Problem(
