@@ -38,6 +38,24 @@ def open_private(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
+class OpenToOthers(PermissionError):
+    """A secret that other users of the computer may read; the sentence says how to close it."""
+
+
+def read_secret(file: Path, most: int) -> bytes:
+    """At most so many bytes. Raises OSError, and of these OpenToOthers.
+
+    systemd shows a credential as readable for its group: an access list lets one user read it.
+    """
+    with file.open("rb") as stream:
+        mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
+        content = stream.read(most)
+    is_credential = str(file.parent) == os.environ.get("CREDENTIALS_DIRECTORY")
+    if HAS_FILE_MODES and mode & (stat.S_IRWXO if is_credential else OTHERS):
+        raise OpenToOthers(f"others on this computer may read it (its mode is {mode:o}): chmod 600 {file}")
+    return content
+
+
 def make_private(place: Path) -> int:
     """Take the rights of other users off a file, or a folder and all in it; how many had some.
 

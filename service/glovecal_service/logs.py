@@ -20,7 +20,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 from glovecal_client.operating_system import move_over
 from glovecal_client.private_files import open_private
@@ -45,13 +45,6 @@ class Word(str):
     """A text of this program's own that names nobody, such as a state."""
 
     __slots__ = ()
-
-
-@runtime_checkable
-class Nameable(Protocol):
-    """An argument of a line that knows what to say of itself where nobody may be named."""
-
-    def without_names(self) -> str: ...
 
 
 class Event:
@@ -138,7 +131,7 @@ class NamelessFormatter(logging.Formatter):
     def _of(self, value: Any) -> Any:
         if value is None or isinstance(value, bool | int | float | Word):
             return value
-        if isinstance(value, Nameable):
+        if isinstance(value, Event):
             return value.without_names()
         text = str(value)
         if isinstance(value, BaseException):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -14,8 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from glovecal_client.hosts import is_loopback
-from glovecal_client.operating_system import HAS_FILE_MODES
-from glovecal_client.private_files import OTHERS
+from glovecal_client.private_files import OpenToOthers, read_secret
 from glovecal_client.site.roles import ROLES, Role
 from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.names import check_identifier
@@ -75,7 +72,7 @@ class Settings(BaseSettings):
     """Which role a value of the claim gives: ``animators=operator,leads=admin``."""
     oidc_name: str = ""
     """What the login page calls the provider; "": the host of its address."""
-    oidc_issuer: str = ""
+    oidc_issuer: Annotated[str, Field(validate_default=True)] = ""
     """Address of the provider of OpenID Connect whose people may log in; "": nobody's."""
     log_names: bool = True
     """Whether lines of the log may name people, gloves and takes."""
@@ -147,6 +144,11 @@ class Settings(BaseSettings):
     def _provider_is_known(cls, issuer: str, info: ValidationInfo) -> str:
         """Whoever could answer in the provider's place could make themselves an admin."""
         if not issuer:
+            for name in ("oidc_client_id", "oidc_secret_file", "oidc_roles", "oidc_name"):
+                if info.data.get(name):
+                    raise ValueError(
+                        f"GLOVECAL_{name.upper()} is of no use without the address of a provider: set it, too"
+                    )
             return issuer
         if not is_safe_address(issuer) or len(issuer) > LONGEST_ISSUER or {"?", "#", "@"} & set(issuer):
             raise ValueError("give the provider's address, https://HOST (http:// on this computer only)")
@@ -211,15 +213,11 @@ def is_safe_address(address: str) -> bool:
 def _read_secret(file: Path) -> str:
     """Raises BadInput, without the secret."""
     try:
-        with file.open("rb") as stream:
-            mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
-            secret = stream.read(_LONGEST_SECRET + 1).decode("ascii", "replace").strip()
+        secret = read_secret(file, _LONGEST_SECRET + 1).decode("ascii", "replace").strip()
+    except OpenToOthers as error:
+        raise BadInput(f"{_SECRET_FILE}: {error}") from error
     except OSError as error:
         raise BadInput(f"{_SECRET_FILE}: the file cannot be read ({reason_of(error)})") from error
-    if HAS_FILE_MODES and mode & OTHERS:
-        raise BadInput(
-            f"{_SECRET_FILE}: others on this computer may use the secret in it (mode {mode:o}): chmod 600 it"
-        )
     if not secret.isprintable() or not secret.isascii() or not 0 < len(secret) <= _LONGEST_SECRET:
         raise BadInput(f"{_SECRET_FILE}: the file must hold the secret that the provider gave, in one line")
     return secret

@@ -56,7 +56,7 @@ def test_the_unit_gets_the_key_that_files_are_encrypted_with(
     given = make_key_file(tmp_path / "given.key").file
     given.chmod(0o440)  # as systemd shows a credential
     monkeypatch.setenv(KEY_FILE, str(given))
-    with pytest.raises(BadEncryptionKey, match="others on this computer may use the key"):
+    with pytest.raises(BadEncryptionKey, match="others on this computer may read it"):
         key_of_environment()
     monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(tmp_path))
     assert key_of_environment() is not None

@@ -180,7 +180,7 @@ CAPTURE = ("capture", "--device", "simulated", "--glove", "right")
         ("other.key", OTHER, SERVE),
         ("other.key", OTHER, CAPTURE),
         ("gone.key", "the key .*gone.key that .* names cannot be read: No such file", LOOK),
-        ("open.key", "others on this computer may use the key .* chmod 600", LOOK),
+        ("open.key", "the key .*open.key: others on this computer may read it .* chmod 600", LOOK),
         ("cut.key", "cut.key, which GLOVECAL_ENCRYPTION_KEY_FILE names, is no key of Glovecal", LOOK),
         ("data/inside.key", "lies inside the data folder .* move it elsewhere", LOOK),
     ],

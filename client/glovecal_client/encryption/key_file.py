@@ -11,7 +11,6 @@ import hmac
 import os
 import re
 import secrets
-import stat
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.util import find_spec
@@ -19,8 +18,8 @@ from pathlib import Path
 
 from glovecal_client.errors import BadEncryptionKey, reason_of
 from glovecal_client.installation import not_installed
-from glovecal_client.operating_system import HAS_FILE_MODES, move_over, sync_file
-from glovecal_client.private_files import OTHERS, PRIVATE_FOLDER, open_private
+from glovecal_client.operating_system import move_over, sync_file
+from glovecal_client.private_files import PRIVATE_FOLDER, OpenToOthers, open_private, read_secret
 
 KEY_FILE = "GLOVECAL_ENCRYPTION_KEY_FILE"
 """The environment variable with the path of the key's file."""
@@ -137,19 +136,14 @@ def _remember(place: Path, key: EncryptionKey) -> None:
 @lru_cache(maxsize=8)
 def _read_once(file: Path) -> EncryptionKey:
     try:
-        with file.open("rb") as stream:
-            mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
-            content = stream.read(_LARGEST_FILE)
+        content = read_secret(file, _LARGEST_FILE)
+    except OpenToOthers as error:
+        raise BadEncryptionKey(f"the key {file}: {error}, and make a new one if somebody read it") from error
     except OSError as error:
         raise BadEncryptionKey(
             f"the key {file} that {KEY_FILE} names cannot be read: {reason_of(error)}. Nothing was changed; "
             f"if there is no key yet, make one: {MADE_BY}"
         ) from error
-    if HAS_FILE_MODES and mode & _forbidden(file):
-        raise BadEncryptionKey(
-            f"others on this computer may use the key {file} (its mode is {mode:o}): chmod 600 it, and make "
-            "a new one if somebody read it"
-        )
     key = _CONTENT.match(content.decode("ascii", "replace"))
     if key is None:
         raise BadEncryptionKey(
@@ -157,9 +151,3 @@ def _read_once(file: Path) -> EncryptionKey:
             f"of 64 hexadecimal digits. Make one: {MADE_BY}"
         )
     return EncryptionKey(file, bytes.fromhex(key[1]))
-
-
-def _forbidden(file: Path) -> int:
-    """systemd shows a credential as readable for its group: an access list lets one user read it."""
-    is_credential = str(file.parent) == os.environ.get("CREDENTIALS_DIRECTORY")
-    return stat.S_IRWXO if is_credential else OTHERS

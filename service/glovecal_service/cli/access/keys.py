@@ -27,12 +27,12 @@ SCOPE_COLUMNS = {"role": "role", "subjects": "of", "created_at": "made"}
 
 def scope_row(row: Key) -> dict[str, Any]:
     """As a table has it."""
-    return {**vars(row), "subjects": "everybody" if row.subjects is None else ", ".join(row.subjects)}
+    return {**vars(row), "subjects": row.sees}
 
 
 def whose(row: Key) -> str:
     """For a sentence: of whom it sees takes and models."""
-    return "everybody's takes and models" if row.subjects is None else f"of {', '.join(row.subjects)} alone"
+    return "everybody's takes and models" if row.subjects is None else f"of {row.sees} alone"
 
 
 @app.command("add")

@@ -18,6 +18,11 @@ class Key(Row):
     created_at: datetime
     revoked_at: datetime | None
 
+    @property
+    def sees(self) -> str:
+        """Whose, in words."""
+        return "everybody" if self.subjects is None else ", ".join(self.subjects)
+
 
 class NewKey(Key):
     key: str = Field(description="The key itself; nobody can be told it again.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import time
 from collections.abc import AsyncIterator, Callable
@@ -10,8 +9,7 @@ from contextlib import asynccontextmanager
 
 import anyio
 
-from glovecal_service.rest.http.pauses import Pauses
-from glovecal_service.rest.http.problem import Problem
+from glovecal_service.rest.http.pauses import Pauses, too_early
 
 MOST_HZ, BURST = 100.0, 500
 """Requests a second, and together before that counts: a page of the studio loads some fifty files."""
@@ -33,12 +31,11 @@ class FairShare:
     async def turn(self, who: str, path: str) -> AsyncIterator[None]:
         """To answer one request. Raises Problem 429 where there were too many."""
         if (wait_s := self._paces.wait_s(who)) > 0.0:
-            seconds = math.ceil(wait_s)
-            raise Problem(
-                429,
+            raise too_early(
+                wait_s,
                 "too-many-requests",
-                f"{who} asks more than {MOST_HZ:g} times a second; ask again in {seconds} s, and less often.",
-                headers={"Retry-After": str(seconds)},
+                f"{who} asks more than {MOST_HZ:g} times a second; ask again in {{seconds}} s, and less "
+                "often.",
             )
         self._paces.count(who)
         if _STAYS_OPEN.fullmatch(path):

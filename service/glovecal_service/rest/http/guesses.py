@@ -8,7 +8,6 @@ process.
 
 from __future__ import annotations
 
-import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable
@@ -19,7 +18,7 @@ from typing import TypeVar
 import anyio
 from anyio.to_thread import run_sync
 
-from glovecal_service.rest.http.pauses import MOST_REMEMBERED, Pauses
+from glovecal_service.rest.http.pauses import MOST_REMEMBERED, Pauses, too_early
 from glovecal_service.rest.http.problem import Problem
 
 AT_ONCE = 10
@@ -57,12 +56,10 @@ class Guesses:
         counted = [(self._addresses, network)] + ([] if is_usual else [(self._names, name)])
         wait_s = max(pauses.wait_s(who) for pauses, who in counted)
         if wait_s > 0.0:
-            seconds = math.ceil(wait_s)
-            raise Problem(
-                429,
+            raise too_early(
+                wait_s,
                 "too-many-guesses",
-                f"Too many wrong passwords of this name or from this address; try again in {seconds} s.",
-                headers={"Retry-After": str(seconds)},
+                "Too many wrong passwords of this name or from this address; try again in {seconds} s.",
             )
         self._require_room()
         for pauses, who in counted:  # before it is known: many at once would all be let through

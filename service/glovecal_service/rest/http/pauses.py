@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable
+
+from glovecal_service.rest.http.problem import Problem
 
 MOST_REMEMBERED = 10_000
 
@@ -31,3 +34,11 @@ class Pauses:
     def take_back(self, who: str) -> None:
         if who in self._free_at:
             self._free_at[who] -= self._pause_s
+
+
+def too_early(wait_s: float, kind: str, sentence: str) -> Problem:
+    """429 for who comes ``wait_s`` too early; ``{seconds}`` in the sentence is how long to wait."""
+    seconds = math.ceil(wait_s)
+    return Problem(
+        429, kind, sentence.replace("{seconds}", str(seconds)), headers={"Retry-After": str(seconds)}
+    )

@@ -11,7 +11,7 @@ from glovecal_service.rest.access.answer import AuditCheck, AuditRow, Key, NewKe
 from glovecal_service.rest.subject.answer import Subject
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import act, heading, main_act
-from glovecal_service.studio.pages.people import PeopleTable, ScopeChoice, whose
+from glovecal_service.studio.pages.people import PeopleTable, ScopeChoice
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -85,7 +85,7 @@ class AccessPage:
         with ui.element("tr"):
             row_head(key.name)
             cell(key.role)
-            cell(whose(key))
+            cell(key.sees)
             cell(moment(key.created_at))
             with ui.element("td"):
                 if key.revoked_at is None:

@@ -13,7 +13,7 @@ from glovecal_client.site.roles import Role
 from glovecal_service.rest.access.answer import Key, Person
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import act, heading, main_act
-from glovecal_service.studio.service import Service, refusals
+from glovecal_service.studio.service import Service, refusals, warn_long
 from glovecal_service.studio.table import cell, row_head, table
 
 MAY = {
@@ -42,10 +42,6 @@ class ScopeChoice:
     def body(self) -> dict[str, object]:
         """As REST takes it."""
         return {"role": self._role.value, "subjects": self._subjects.value or None}
-
-
-def whose(row: Key) -> str:
-    return "everybody" if row.subjects is None else ", ".join(row.subjects)
 
 
 class PeopleTable:
@@ -85,7 +81,7 @@ class PeopleTable:
             if not people:
                 ui.label("Nobody yet.")
                 return
-            with table("People", ("Person", "Role", "Of", "Proof", "")):
+            with table("People", ("Person", "Role", "Of", "Logs in", "")):
                 for person in people:
                     self._row(person)
 
@@ -93,8 +89,8 @@ class PeopleTable:
         with ui.element("tr"):
             row_head(person.name)
             cell(person.role)
-            cell(whose(person))
-            cell(_proof(person))
+            cell(person.sees)
+            cell(_login(person))
             with ui.element("td"):
                 if person.revoked_at is None:
                     act(f"Change {person.name}", partial(self._open, person))
@@ -124,13 +120,18 @@ class PeopleTable:
         assert person is not None
         self._dialog.close()
         self._new_password.set_value("")
+        is_other = self._new_scope.body != {"role": person.role, "subjects": person.subjects}
+        if not (is_other or password):
+            self._message.set_text("Nothing was changed.")
+            return
         with refusals(self._message.set_text):
-            if self._new_scope.body != {"role": person.role, "subjects": person.subjects}:
+            if is_other:
                 await self._service.put(f"/people/{person.name}", self._new_scope.body)
             if password:
                 await self._service.put(f"/people/{person.name}/password", {"password": password})
             self._message.set_text(f"{person.name} is changed, and logs in again.")
-        await self._changed()
+        with refusals(warn_long):
+            await self._changed()
 
     async def _remove(self, name: str) -> None:
         with refusals(self._message.set_text):
@@ -139,10 +140,10 @@ class PeopleTable:
             await self._changed()
 
 
-def _proof(person: Person) -> str:
+def _login(person: Person) -> str:
     if person.password_changed_at is None:
-        return f"login at {urlsplit(person.issuer or '').hostname}"
-    return f"password of {moment(person.password_changed_at)}"
+        return f"at {urlsplit(person.issuer or '').hostname}"
+    return f"with a password of {moment(person.password_changed_at)}"
 
 
 def _password_input(label: str) -> ui.input:
