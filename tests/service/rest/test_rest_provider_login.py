@@ -77,7 +77,8 @@ def service(data: Path, issuer: str, **settings: Any) -> Iterator[Service]:
     secret.write_text(f"{SECRET}\n")
     secret.chmod(0o600)
     given = {"oidc_client_id": CLIENT, "oidc_secret_file": secret, "oidc_roles": ROLES, "oidc_name": "Studio"}
-    chosen = Settings(data=data, login="always", oidc_issuer=issuer, **(given | settings))
+    given = given | settings if issuer else settings
+    chosen = Settings(data=data, login="always", oidc_issuer=issuer, **given)
     with Store.open(chosen) as store:
         key = store.keys.create("boss", "admin")[1]
         app = create_app(chosen, store)

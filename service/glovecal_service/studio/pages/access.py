@@ -66,11 +66,12 @@ class AccessPage:
         await self._people.look()
         self._keys.clear()
         with self._keys:
-            if not keys:
+            if keys:
+                with table("Keys", ("Key", "Role", "Of", "Made", "")):
+                    for key in keys:
+                        self._key_row(key)
+            else:
                 ui.label("No key yet.")
-            with table("Keys", ("Key", "Role", "Of", "Made", "")):
-                for key in keys:
-                    self._key_row(key)
         self._changes.clear()
         with self._changes, table("Changes, the newest first", ("When", "Who", "From", "Asked", "Changed")):
             for change in changes:

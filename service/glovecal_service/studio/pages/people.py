@@ -52,7 +52,7 @@ class PeopleTable:
         heading(2, "People")
         ui.label(
             "Whoever is here logs in to the studio with a name and a password, and changes it there. People "
-            "of a provider are here once they logged in; it gives their role."
+            "of a provider are here once they have logged in; it gives their role."
         )
         with ui.row().classes("choices"):
             self._name = ui.input("Name of the person")

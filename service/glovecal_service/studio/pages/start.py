@@ -59,7 +59,9 @@ class StartPage:
                 )
                 ui.link("Takes", "/takes").classes("studio-link")
             with _section("access", "Let others in"):
-                ui.label("Others who reach this service need a key; who changed what is written down.")
+                ui.label(
+                    "Others who reach this service need a key or a password; who changed what is written down."
+                )
                 ui.link("Keys, people and changes", "/access").classes("studio-link")
         await self._look()
         ui.timer(EVERY_S, self._look)
