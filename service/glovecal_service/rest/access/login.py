@@ -115,7 +115,7 @@ async def log_out(request: Request, store: StoreNeeded) -> Response:
 
 @router.get("/password")
 def show_change() -> HTMLResponse:
-    return _change_page("Changing your password ends what you are logged in to.", 200)
+    return _change_page("Changing your password logs you out everywhere.", 200)
 
 
 @router.post("/password")

@@ -60,7 +60,8 @@ class StartPage:
                 ui.link("Takes", "/takes").classes("studio-link")
             with _section("access", "Let others in"):
                 ui.label(
-                    "Others who reach this service need a key or a password; who changed what is written down."
+                    "Others who reach this service need a key or a password; who changed what is written "
+                    "down."
                 )
                 ui.link("Keys, people and changes", "/access").classes("studio-link")
         await self._look()
