@@ -6,6 +6,8 @@ The rest is in ``glovecal_client.operating_system``, where the facts of locks, s
   of processes (SetPriorityClass) and, within them, priorities of threads (SetThreadPriority). Everybody may
   ask for ABOVE_NORMAL; HIGH would keep the computer's other programs waiting.
 * Stop: a process in a group of its own hears CTRL_BREAK_EVENT alone, and no Ctrl-C of its console.
+* Open files: shells give a process 256 (macOS) or 1,024 (Linux), and it may take up to a limit of thousands
+  by itself; each connection is one. Windows has no such limit.
 * Memory: Linux makes files that have no place on a disk (``memfd_create``).
 * Fork: only the libraries of Linux survive it.
 * Keys: ``termios`` is of POSIX. Windows has ``msvcrt.getwch`` for its console, where a special key is two
@@ -36,6 +38,7 @@ FIRST, BEHIND = -10, 10
 """Nicenesses of real time and of training."""
 _ABOVE_NORMAL_CLASS, _BELOW_NORMAL_CLASS, _BELOW_NORMAL_THREAD = 0x8000, 0x4000, -1
 _LOOK_S = 0.02
+_OPEN_FILES = 10_240
 
 
 def children_context():
@@ -62,6 +65,19 @@ def folder_in_memory() -> str | None:
 def path_of(file: BinaryIO) -> Path:
     """By which this process, and others of its user, open a ``memory_file`` as long as it is open here."""
     return Path(f"/proc/{os.getpid()}/fd/{file.fileno()}")
+
+
+def open_many_files() -> None:
+    """Take as many open files as this process may have, for itself and its children."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _OPEN_FILES if most == resource.RLIM_INFINITY else min(most, _OPEN_FILES)
+    if least != resource.RLIM_INFINITY and least < wanted:
+        with suppress(OSError, ValueError):  # macOS says that it has no limit, and has one
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def go_first() -> None:

@@ -41,7 +41,7 @@ from glovecal_client.site.certificates import check_certificate
 from glovecal_client.site.member import read_member
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_service.logs import Word, log_to_stderr
-from glovecal_service.operating_system import FORKS, children_context
+from glovecal_service.operating_system import FORKS, children_context, open_many_files
 from glovecal_service.plain import reason_of
 from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
@@ -161,6 +161,7 @@ def _serve(settings: Settings, parts: list[Part], lock: DataFolderLock) -> int:
     lock.say_who(f"process {os.getpid()} on {socket.gethostname()}, {_web_address(settings)}")
     stopped = Event()
     handle_signals(lambda *_: stopped.set(), *STOP_SIGNALS, *HANG_UP)
+    open_many_files()
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
     Restarts(settings.data).forget()

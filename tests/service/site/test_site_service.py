@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import socket
 import ssl
@@ -111,6 +112,19 @@ def test_rest_is_encrypted_and_answers_to_its_names_alone(
     context.maximum_version = ssl.TLSVersion.TLSv1_2
     with socket.create_connection(("127.0.0.1", served.port)) as opened, context.wrap_socket(opened) as older:
         assert older.version() == "TLSv1.2"
+
+
+def test_who_never_ends_the_tls_handshake_is_ended_before_who_never_sends_a_request(served: Served) -> None:
+    address = ("127.0.0.1", served.port)
+    context = client_context(read_member(served.place / "watcher.glovecal"))
+    context.maximum_version = ssl.TLSVersion.TLSv1_2  # 1.3 sends tickets after its handshake
+    with (
+        context.wrap_socket(socket.create_connection(address), server_hostname="127.0.0.1") as silent,
+        socket.create_connection(address) as half_open,
+    ):
+        ended, _, _ = select.select([silent, half_open], [], [], 120)
+        assert ended == [half_open]
+        assert half_open.recv(1) == b""
 
 
 def test_verbs_find_the_service_by_the_file_alone_and_it_is_healthy(served: Served) -> None:

@@ -1,4 +1,4 @@
-"""Uvicorn as Glovecal runs it: bounded connections, a deadline for headers, a bounded shutdown."""
+"""Uvicorn as Glovecal runs it: bounded connections, deadlines for TLS and headers, a bounded shutdown."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ import ssl
 from typing import Any
 
 import uvicorn
+from uvicorn.loops.auto import auto_loop_factory
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from glovecal_client.hosts import is_loopback
 
 HEADER_DEADLINE_S = 10.0
 """A connection that has not sent complete headers by then is closed (slow-header attacks)."""
+HANDSHAKE_DEADLINE_S = 5.0
+"""A connection that has not agreed on TLS by then is closed; until it has, it counts as none of these:"""
 MOST_CONNECTIONS = 512
 MOST_OF_ONE_ADDRESS = 256
 """One computer keeps nobody else out, unless it is this one: a page's parts ask from here."""
@@ -74,6 +77,22 @@ def _send_at_once(transport: asyncio.Transport) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
+def new_event_loop() -> asyncio.AbstractEventLoop:
+    """The loop that uvicorn chooses, whose servers wait for a TLS handshake for ``HANDSHAKE_DEADLINE_S``: by
+    themselves they wait for a minute, and uvicorn has no setting for it."""
+    chosen = auto_loop_factory()()
+    chosen.close()
+    kind: Any = type(chosen)
+
+    class Loop(kind):
+        async def create_server(self, *args: Any, ssl: Any = None, **more: Any) -> Any:
+            if ssl is not None:
+                more["ssl_handshake_timeout"] = HANDSHAKE_DEADLINE_S
+            return await super().create_server(*args, ssl=ssl, **more)
+
+    return Loop()
+
+
 def server_config(app: Any, host: str, port: int, context: ssl.SSLContext | None = None) -> uvicorn.Config:
     """The configuration to start ``uvicorn.Server`` with, for ``app`` from ``create_app``; with a ``context``
     it speaks TLS.
@@ -86,6 +105,7 @@ def server_config(app: Any, host: str, port: int, context: ssl.SSLContext | None
         host=host,
         port=port,
         http=PatientH11Protocol,
+        loop=f"{__name__}:{new_event_loop.__name__}",
         log_config=None,
         ssl_context_factory=None if context is None else lambda *_: context,
         access_log=False,
