@@ -148,20 +148,36 @@ def test_a_changed_row_is_found(anna, change):
         anna.models.active(subject, "cyberglove18")
 
 
-def test_the_revision_grows_with_what_the_live_stream_must_know(anna):
-    def grows(action) -> bool:
-        before = anna.revision()
+def test_what_changed_is_told_to_who_follows(anna):
+    def told(action) -> set[tuple[str, str]]:
+        before = anna.changes_since(None).revision
         action()
-        return anna.revision() > before
+        changes = anna.changes_since(before)
+        assert not changes.everything
+        assert not anna.changes_since(changes.revision).changed
+        return set(changes.changed)
 
     one, two = add(anna, b"one"), add(anna, b"two")
-    assert grows(lambda: anna.models.activate(one.id))
-    assert grows(lambda: anna.models.activate(two.id))
-    assert grows(lambda: anna.models.rollback("anna", "cyberglove18"))
-    assert grows(lambda: anna.gloves.assign("left", "anna", "morning"))
-    assert grows(lambda: anna.recordings.request("left", name="first"))
-    assert not grows(lambda: anna.subjects.list())
-    assert not grows(lambda: add(anna, b"three"))
+    assert told(lambda: anna.models.activate(one.id)) == {("subject", "anna")}
+    assert told(lambda: anna.models.activate(two.id)) == {("subject", "anna")}
+    assert told(lambda: anna.models.rollback("anna", "cyberglove18")) == {("subject", "anna")}
+    assert told(lambda: anna.gloves.assign("left", "anna", "morning")) == {("glove", "left")}
+    assert told(lambda: anna.recordings.request("left", name="first")) == {("recording", "")}
+    assert told(lambda: anna.subjects.list()) == set()
+    assert told(lambda: add(anna, b"three")) == set()
+
+
+def test_who_starts_who_is_ahead_and_who_missed_a_forgotten_person_look_at_everything(anna):
+    seen = anna.changes_since(None)
+    assert seen.everything
+    assert anna.changes_since(seen.revision + 7).everything, "a backup was restored"
+    anna.subjects.create("ben")
+    anna.subjects.measure("ben", {"hand_length": 180.0})
+    assert anna.changes_since(seen.revision).names("subject") == {"ben"}
+    anna.subjects.remove("ben")
+    changes = anna.changes_since(seen.revision)
+    assert changes.everything
+    assert changes.names("subject") == set()
 
 
 def test_every_activation_of_many_threads_is_kept_in_one_order(anna):

@@ -24,6 +24,7 @@ from glovecal_service.realtime.glove_lanes import GlovePipeline
 from glovecal_service.realtime.lane_effects import GloveContext, WornGloves
 from glovecal_service.realtime.pose_meta import GloveMetas, PoseMetas, Serving
 from glovecal_service.realtime.served_model import ServedModel, ServedModels
+from glovecal_service.store.changes import Changes
 from glovecal_service.store.errors import (
     Conflict,
     DamagedRows,
@@ -219,8 +220,10 @@ def _first_that_loads(
     for model_id in chain:
         model = _in_use(prepared, model_id, sent)
         try:
-            content = store.artifacts.get(model_id)
-            model = model or _prepare(model_id, content, sent)
+            if model is None:
+                model = _prepare(model_id, store.artifacts.get(model_id), sent)
+            else:
+                store.artifacts.verify(model_id)
         except (DamagedArtifact, NotFound, BadInput) as error:
             remedies = other_remedies(active, can_roll_back=len(chain) > 1)
             if model is None:
@@ -361,16 +364,24 @@ class ModelWatcher:
     def _follow(self, store: Store) -> None:
         for glove in sorted(filter(self._metas.is_proven, self._unnoted)):
             self._note(store, glove)
-        revision = store.revision()
-        if revision != self._revision:
-            self._to_choose |= self._gloves
+        changes = store.changes_since(self._revision)
+        self._to_choose |= self._concerned(changes)
+        if changes.are_of("glove"):
             self._unnoted |= self._metas.proven() - store.gloves.names()
         late = time.monotonic() - TRY_AGAIN_AFTER_S
         self._to_choose |= {glove for glove, at in self._troubled_at.items() if at < late}
         self._look_at_artifacts(store)
         for glove in sorted(self._to_choose):
             self._choose(store, glove)
-        self._revision = revision
+        self._revision = changes.revision
+
+    def _concerned(self, changes: Changes) -> set[str]:
+        """Gloves that may have to be served otherwise."""
+        if changes.everything:
+            return set(self._gloves)
+        subjects, documents = changes.names("subject"), self._pose_metas.documents()
+        worn = {name for name, document in documents.items() if document["subject"] in subjects}
+        return self._gloves & (changes.names("glove") | worn)
 
     def _look_at_artifacts(self, store: Store) -> None:
         """Frames do not read them, so that a damage would only be noticed at the next start."""
@@ -378,8 +389,9 @@ class ModelWatcher:
             return
         self._artifacts_at = time.monotonic() + TRY_AGAIN_AFTER_S
         damaged = {id for id, _ in self._models.in_use() if not store.artifacts.is_sound(id)}
-        if damaged != self._damaged:
-            self._to_choose |= self._gloves
+        changed = damaged ^ self._damaged
+        documents = self._pose_metas.documents()
+        self._to_choose |= {glove for glove in self._gloves if documents[glove]["model"] in changed}
         self._damaged = damaged
 
     def _is_camera(self, glove: str) -> bool:

@@ -140,10 +140,12 @@ class Recorder:
         return self._store
 
     def _follow(self, store: Store) -> None:
-        revision = store.revision()
-        if revision != self._revision or self._is_anything_due():
+        changes = store.changes_since(self._revision)
+        if changes.are_of("recording") or self._is_anything_due():
             settled = [self._move(store, record) for record in _sound(store.recordings.unsettled)]
-            self._revision = revision if all(settled) else None
+            self._revision = changes.revision if all(settled) else None
+        else:
+            self._revision = changes.revision
 
     def _is_anything_due(self) -> bool:
         return any(future.done() for future in self._settling.values()) or any(

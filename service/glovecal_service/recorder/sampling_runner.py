@@ -230,8 +230,9 @@ class SamplingRunner:
             self._revision, self._follow_at = None, time.monotonic() + AFTER_TROUBLE_S
 
     def _follow(self, store: Store) -> None:
-        revision = store.revision()
-        if revision == self._revision:
+        changes = store.changes_since(self._revision)
+        if not changes.are_of("sampling"):
+            self._revision = changes.revision
             return
         records = {record.id: record for record in _open_samplings(store)}
         for id in [id for id in self._live if id not in records]:
@@ -247,7 +248,7 @@ class SamplingRunner:
                     self._live[id] = LiveSampling(self._session, keys, record, layout, watch)
             except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {reason_of(error)}")
-        self._revision = revision
+        self._revision = changes.revision
 
     def _go_on(self, store: Store, live: LiveSampling) -> None:
         try:

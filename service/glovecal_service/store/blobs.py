@@ -263,9 +263,9 @@ class Artifacts:
         self._blobs.remove(sha256)
 
     def is_sound(self, sha256: str) -> bool:
-        """Whether there is a file of that name that holds what was put there."""
+        """Whether there is a file of that name that holds what was put there, as ``verify`` finds it."""
         try:
-            self.get(sha256)
+            self.verify(sha256)
         except (NotFound, DamagedArtifact):
             return False
         return True

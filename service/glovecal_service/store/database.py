@@ -6,7 +6,7 @@ power cut; ``BEGIN IMMEDIATE`` for writing so that a transaction waits for the l
 failing in its middle. Python's own transaction handling is switched off (``isolation_level=None``), or
 schema changes would commit half-way.
 
-Here too: the time and the identifiers that rows get, and the number that grows with what they hold.
+Here too: the time and the identifiers that rows get.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from copy import copy
 from datetime import UTC, datetime
 from pathlib import Path
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, select, update
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -37,7 +37,6 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from glovecal_client.installation import not_installed
 from glovecal_models.errors import BadInput
 from glovecal_service.logs import Word
-from glovecal_service.store import tables
 from glovecal_service.store.actor import OPTION, Actor
 from glovecal_service.store.audit_trail import watch_changes, written_down
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
@@ -262,30 +261,3 @@ def _disk_is_full(database: Database) -> bool:
         return shutil.disk_usage(database.file.parent).free < LEAST_ROOM_BYTES
     except OSError:
         return False
-
-
-def grow_revision(connection: Connection) -> int:
-    """Add one inside the caller's transaction: the real-time process has something to look at.
-
-    The row is locked until that transaction ends, so whatever else grows the revision is done one after
-    the other on PostgreSQL too.
-    """
-    statement = update(tables.revision).values(value=tables.revision.c.value + 1)
-    value = connection.scalar(statement.returning(tables.revision.c.value))
-    if value is None:
-        raise StoreDamaged("the revision of the store is missing; restore a backup of the database")
-    return int(value)
-
-
-class Revision:
-    """Reads the number; cheap enough to poll ten times a second."""
-
-    def __init__(self, database: Database) -> None:
-        self._database = database
-
-    def __call__(self) -> int:
-        with self._database.read() as connection:
-            value = connection.scalar(select(tables.revision.c.value))
-        if not isinstance(value, int):
-            raise StoreDamaged("the revision of the store is missing; restore a backup of the database")
-        return value

@@ -32,7 +32,8 @@ from glovecal_service.store.belongings import (
     parts_of,
     recording_files,
 )
-from glovecal_service.store.database import grow_revision, new_id, now
+from glovecal_service.store.changes import tell_forgotten_subject
+from glovecal_service.store.database import new_id, now
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import OPEN_RECORDING_STATES, JobRecord
 from glovecal_service.store.row_hash import change_rows
@@ -93,7 +94,7 @@ def erase(store: Store, settings: Settings, name: str) -> ErasureRecord:
         _require_as_seen(connection, of)
         removed = _remove_rows(connection, of, jobs)
         rewriting.write(connection)
-        grow_revision(connection)
+        tell_forgotten_subject(connection, name)
         connection.execute(insert(tables.erasures).values(id=id, files=files, began_at=now()))
         counted = {**removed, "files": len(files)}
         proof = {"removed": counted, "sha256": sorted(file["sha256"] for file in hashed if file["sha256"])}

@@ -13,7 +13,8 @@ from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, subject_name
 from glovecal_models.takes.take import KnownLatency
 from glovecal_service.store import tables
-from glovecal_service.store.database import Database, grow_revision, now
+from glovecal_service.store.changes import tell_change
+from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import OPEN_RECORDING_STATES, GloveRecord, TakeRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
@@ -43,12 +44,12 @@ class Gloves:
             earlier = _find(connection, glove)
             if earlier is None:
                 _add(connection, {**said, "name": glove, "first_seen_at": said["last_seen_at"]})
-                grow_revision(connection)
+                tell_change(connection, "glove", glove)
             else:
                 _keep_chosen_wearer(said, earlier)
                 _change(connection, glove, said)
                 if any(said[name] != getattr(earlier, name) for name in _WEARER):
-                    grow_revision(connection)
+                    tell_change(connection, "glove", glove)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
     def with_meta(self, glove: str, meta: Mapping[str, Any] | None) -> GloveRecord:
@@ -77,7 +78,7 @@ class Gloves:
                     "once that is done"
                 )
             connection.execute(delete(tables.gloves).where(tables.gloves.c.name == name))
-            grow_revision(connection)
+            tell_change(connection, "glove", name)
 
     def names(self) -> set[str]:
         """Of all gloves."""
@@ -117,7 +118,7 @@ class Gloves:
                 "assigned_run_id": earlier.run_id if earlier else None,
             }
             _change(connection, glove, chosen)
-            grow_revision(connection)
+            tell_change(connection, "glove", glove)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
     def set_latency(self, glove: str, latency: Mapping[str, Any] | None) -> GloveRecord:
@@ -129,7 +130,7 @@ class Gloves:
             if _find(connection, glove) is None:
                 _add(connection, _unseen(glove, now()))
             _change(connection, glove, {"latency": None if latency is None else dict(latency)})
-            grow_revision(connection)
+            tell_change(connection, "glove", glove)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 
 

@@ -15,7 +15,8 @@ from glovecal_models.hand.rotations import Handedness, is_of_hand, known_hand
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
 from glovecal_service.store.blobs import Artifacts
-from glovecal_service.store.database import Database, grow_revision, now
+from glovecal_service.store.changes import tell_change
+from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.list_part import WHOLE, ListPart
 from glovecal_service.store.records import NAME, NOTE, REMOVED, Activation, ModelRecord
@@ -145,7 +146,7 @@ class Models:
         model = self.get(id)
         self._artifacts.get(model.id)
         with self._database.write() as connection:
-            grow_revision(connection)
+            tell_change(connection, "subject", model.subject)
             earlier = _current(connection, model.subject, model.layout, model.hand)
             if earlier is not None and earlier.model == model.id:
                 if earlier.id == _newest(connection, model.subject):
@@ -166,7 +167,7 @@ class Models:
                 "which hand: --hand left or --hand right"
             )
         with self._database.write() as connection:
-            grow_revision(connection)
+            tell_change(connection, "subject", subject)
             current = _current(connection, subject, layout, hand)
             target = None if current is None else _before(connection, current, hand)
             if target is None:

@@ -11,7 +11,8 @@ from sqlalchemy import ColumnElement, Connection, select
 from glovecal_models.errors import BadInput
 from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
-from glovecal_service.store.database import Database, grow_revision, new_id, now
+from glovecal_service.store.changes import tell_change
+from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import (
     OPEN_RECORDING_STATES,
@@ -81,7 +82,7 @@ class Recordings:
             )
         at, id = now(), new_id()
         with self._database.write() as connection:
-            grow_revision(connection)
+            tell_change(connection, "recording")
             worn = connection.execute(
                 select(tables.gloves).where(tables.gloves.c.name == glove)
             ).one_or_none()
@@ -117,7 +118,7 @@ class Recordings:
         if name is not None:
             check_text(name, "name of the recording")
         with self._database.write() as connection:
-            grow_revision(connection)
+            tell_change(connection, "recording")
             before = _require(connection, id)
             if _ORDER[before.state] >= _STOPPING:
                 return before
@@ -149,7 +150,7 @@ class Recordings:
             raise BadInput(f"{state!r} is no state of a recording; {did_you_mean(state, _ORDER)}")
         with self._database.write() as connection:
             if state is not None:
-                grow_revision(connection)
+                tell_change(connection, "recording")
             return _move(connection, id, state, facts)
 
     def get(self, id: str) -> RecordingRecord:

@@ -12,7 +12,8 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from glovecal_service.store import tables
-from glovecal_service.store.database import Database, grow_revision, new_id, now
+from glovecal_service.store.changes import tell_change
+from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
@@ -57,7 +58,7 @@ class Samplings:
                 "updated_at": at,
             }
             add_row(connection, table, values)
-            grow_revision(connection)
+            tell_change(connection, "sampling")
             return _require(connection, id)
 
     def get(self, id: str) -> SamplingRecord:
@@ -84,7 +85,7 @@ class Samplings:
         with self._database.write() as connection:
             if not change_rows(connection, table, same, values):
                 return None
-            grow_revision(connection)
+            tell_change(connection, "sampling")
             return _require(connection, seen.id)
 
     def note(self, id: str, **values: Any) -> None:

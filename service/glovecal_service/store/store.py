@@ -14,8 +14,9 @@ from glovecal_service.settings import Settings
 from glovecal_service.store.actor import NOBODY_ELSE, Actor
 from glovecal_service.store.audit import Audit
 from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
+from glovecal_service.store.changes import Changes, changes_since
 from glovecal_service.store.data_folder_lock import LOCK, WHO
-from glovecal_service.store.database import Database, Revision
+from glovecal_service.store.database import Database
 from glovecal_service.store.gloves import Gloves
 from glovecal_service.store.jobs import Jobs
 from glovecal_service.store.keys import Keys
@@ -51,7 +52,6 @@ class Store:
         self.people = People(database)
         self.sessions = Sessions(database)
         self.audit = Audit(database)
-        self.revision = Revision(database)
 
     @classmethod
     def open(cls, settings: Settings, *, clock: Callable[[], float] = time.time) -> Store:
@@ -79,6 +79,10 @@ class Store:
             database.close()
             raise
         return cls(database, Artifacts(blobs), clock)
+
+    def changes_since(self, seen: int | None) -> Changes:
+        """As ``glovecal_service.store.changes`` has it."""
+        return changes_since(self.database, seen)
 
     def acting_as(self, actor: Actor) -> Store:
         """The same store, asked by somebody: what they do not see is not there, and changes are theirs."""

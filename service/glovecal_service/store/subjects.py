@@ -14,7 +14,8 @@ from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
-from glovecal_service.store.database import Database, grow_revision, now
+from glovecal_service.store.changes import tell_change, tell_forgotten_subject
+from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
 from glovecal_service.store.records import SubjectRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
@@ -73,7 +74,7 @@ class Subjects:
             require_subject(connection, name)
             changed = update(tables.subjects).where(tables.subjects.c.name == name)
             connection.execute(changed.values(**values))
-            grow_revision(connection)  # poses go with the hand that draws them
+            tell_change(connection, "subject", name)  # poses go with the hand that draws them
             return require_subject(connection, name)
 
     def remove(self, name: str) -> None:
@@ -87,7 +88,7 @@ class Subjects:
             worn = update(tables.gloves).where(tables.gloves.c.subject == name)
             connection.execute(worn.values(subject=None, wearing=None))
             connection.execute(delete(tables.subjects).where(tables.subjects.c.name == name))
-            grow_revision(connection)
+            tell_forgotten_subject(connection, name)
 
 
 def require_subject(connection: Connection, name: str) -> SubjectRecord:

@@ -318,6 +318,16 @@ revision = Table(
     Column("value", BigInteger, nullable=False),
 )
 
+changes = Table(
+    "changes",
+    metadata,
+    Column("kind", String(16), primary_key=True),
+    Column("name", NAME, primary_key=True),
+    Column("revision", BigInteger, nullable=False),
+    Index(None, "revision"),
+)
+"""At which revision a thing changed last."""
+
 keys = Table(
     "keys",
     metadata,
