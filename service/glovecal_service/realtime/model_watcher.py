@@ -380,8 +380,8 @@ class ModelWatcher:
         if changes.everything:
             return set(self._gloves)
         subjects, documents = changes.names("subject"), self._pose_metas.documents()
-        worn = {name for name, document in documents.items() if document["subject"] in subjects}
-        return self._gloves & (changes.names("glove") | worn)
+        theirs = {name for name, document in documents.items() if document["subject"] in subjects}
+        return self._gloves & (changes.names("glove") | theirs)
 
     def _look_at_artifacts(self, store: Store) -> None:
         """Frames do not read them, so that a damage would only be noticed at the next start."""
