@@ -24,6 +24,8 @@ from glovecal_client.wire.pose import Pose, decode_pose
 
 _BEGINS_AGAIN = 3
 """Poses in a row."""
+_TERM_LASTS_NS = 1_000_000_000
+"""For so long after a pose those of an earlier term are late; later they are of a service that began anew."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class PoseCounts:
     lost: int = 0
     """Frames with neither a pose nor a skip: lost between the service and here, or before the service."""
     repeated: int = 0
-    """Poses for a frame that was already shown or overtaken; ignored."""
+    """Poses for a frame that was already shown or overtaken, or by a process that had lost the glove;
+    ignored."""
     damaged: int = 0
     """Messages that were no whole pose; ignored."""
     runs: int = 0
@@ -55,6 +58,9 @@ class PoseOrder:
     def accept(self, pose: Pose) -> bool:
         """Whether the pose is to be shown: newer than all before, or a first notice that it is stale."""
         last = self._last
+        if last is not None and _is_overruled(pose, last):
+            self._repeated += 1
+            return False
         if last is None or pose.run_id != last.run_id:
             self._runs += 1
             if pose.stale:  # a repetition of a frame from before this subscriber listened
@@ -99,6 +105,11 @@ class PoseOrder:
         """The counts of this moment."""
         lost = max(0, self._gaps - self._skipped)
         return PoseCounts(self._received, self._skipped, lost, self._repeated, self._damaged, self._runs)
+
+
+def _is_overruled(pose: Pose, last: Pose) -> bool:
+    """Whether another process had taken the glove over when ``pose`` was made."""
+    return pose.term < last.term and pose.wall_ns - last.wall_ns < _TERM_LASTS_NS
 
 
 STALE_AFTER_S = 0.5

@@ -239,6 +239,37 @@ def test_received_skipped_and_lost_add_up(steps: list[tuple[int, bool]], data: s
     assert counts.repeated == len(steps)
 
 
+def test_late_poses_of_a_process_that_lost_the_glove_are_dropped() -> None:
+    def pose(sequence: int, term: int, at_s: float | None = None) -> Pose:
+        at_ns = round(1e9 * (sequence / 120 if at_s is None else at_s))
+        return Pose(sequence, 1, at_ns, at_ns, term=term)
+
+    order = PoseOrder()
+    taken = [order.accept(each) for each in (
+        pose(0, 5), pose(1, 5),
+        pose(2, 9), pose(2, 5), pose(3, 5), pose(3, 9),  # both for a moment: each frame once
+        pose(4, 5), pose(4, 5), pose(5, 5), pose(6, 5), pose(4, 9),
+        pose(120, 5), pose(400, 5, at_s=1.2), pose(401, 5, at_s=1.3),  # the other is gone for good
+    )]  # fmt: skip
+    assert taken == [
+        True,
+        True,
+        True,
+        False,
+        False,
+        True,
+        False,
+        False,
+        False,
+        False,
+        True,
+        False,
+        True,
+        True,
+    ]
+    assert order.counts().repeated == 7
+
+
 def test_poses_go_on_when_the_numbers_of_the_glove_begin_again() -> None:
     """A glove restarted without a new run id, and one whose numbers jumped: nothing of that is lost."""
     order = PoseOrder()

@@ -82,6 +82,8 @@ class Pose:
     """Frames of this run that the service has skipped so far."""
     age_us: int = 0
     """Microseconds from the service's receipt of the frame to publication, plus the glove's known latency."""
+    term: int = 0
+    """Of the process that made it, higher with each process that took the glove over; 0: it does not say."""
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -137,7 +139,7 @@ def encode_pose(pose: Pose) -> bytes:
     (rotations,) = encode_rotations(degrees[None], deviations[None], rotation_flags[None])
     return encode_around(
         rotations, pose.sequence, pose.run_id, pose.monotonic_ns, pose.wall_ns,
-        model_bytes(pose.model_sha256), pose.flags, pose.skipped, pose.age_us,
+        model_bytes(pose.model_sha256), pose.flags, pose.skipped, pose.age_us, pose.term,
     )  # fmt: skip
 
 
@@ -156,7 +158,7 @@ def encode_rotations(
 
 def encode_around(
     rotations: bytes, sequence: int, run_id: int, monotonic_ns: int, wall_ns: int,
-    model: bytes, flags: int, skipped: int, age_us: int,
+    model: bytes, flags: int, skipped: int, age_us: int, term: int = 0,
 ) -> bytes:  # fmt: skip
     """A message around ``rotations``, one of those that ``encode_rotations`` gave.
 
@@ -166,7 +168,7 @@ def encode_around(
     try:
         head = _HEAD.pack(
             _MAGIC, _VERSION, flags, len(rotations) // 9, sequence, monotonic_ns, wall_ns, run_id,
-            skipped, age_us, 0, model,
+            skipped, age_us, term, model,
         )  # fmt: skip
     except struct.error as error:
         raise WireError(f"pose {sequence}: a number does not fit its field") from error
@@ -180,7 +182,7 @@ def decode_pose(message: bytes) -> Pose:
             f"pose: cut short, {len(message)} bytes; the smallest has {_HEAD.size + CHECKSUM_BYTES}"
         )
     head = _HEAD.unpack_from(message)
-    magic, version, flags, count, sequence, monotonic_ns, wall_ns, run_id, skipped, age_us, _, model = head
+    magic, version, flags, count, sequence, monotonic_ns, wall_ns, run_id, skipped, age_us, term, model = head
     if magic != _MAGIC:
         raise WireError(f"pose: starts with {magic!r}, not {_MAGIC!r}")
     if version != _VERSION:
@@ -195,7 +197,7 @@ def decode_pose(message: bytes) -> Pose:
     _check_values(degrees[None], deviations[None], rotation_flags[None])
     return Pose(
         sequence, run_id, monotonic_ns, wall_ns, degrees, deviations, rotation_flags,
-        None if model == _NO_MODEL else model.hex(), flags, skipped, age_us,
+        None if model == _NO_MODEL else model.hex(), flags, skipped, age_us, term,
     )  # fmt: skip
 
 
