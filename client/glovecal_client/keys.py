@@ -159,6 +159,35 @@ def all_services(site: str) -> str:
     return f"{ROOT}/{check_identifier(site, 'site')}/service/*/alive"
 
 
+def parse_service_key(key: str) -> str:
+    """The instance of a key that ``service_alive_key`` gave. Raises BadName."""
+    parts = key.split("/")
+    if len(parts) != 5 or (parts[0], parts[2], parts[4]) != (ROOT, "service", "alive"):
+        raise BadName(f"key: {key!r} is not {ROOT}/<site>/service/<instance>/alive")
+    return check_identifier(parts[3], "service instance")
+
+
+def term_key(site: str, instance: str, glove: str, term: int) -> str:
+    """Liveliness token of a service process that has a glove."""
+    return service_alive_key(site, instance).removesuffix("alive") + f"has/{glove}/{term}"
+
+
+def all_terms(site: str) -> str:
+    """Key expression for these tokens of all gloves of a site."""
+    return all_services(site).removesuffix("alive") + "has/*/*"
+
+
+def parse_term_key(key: str) -> tuple[str, str, int]:
+    """Instance, glove and term of a key that ``term_key`` gave. Raises BadName."""
+    parts = key.split("/")
+    if len(parts) != 7 or (parts[0], parts[2], parts[4]) != (ROOT, "service", "has"):
+        raise BadName(f"key: {key!r} is not {ROOT}/<site>/service/<instance>/has/<glove>/<term>")
+    term = parts[6]
+    if not (term.isascii() and term.isdigit() and len(term) <= 10):
+        raise BadName(f"key: the term of {key!r} is no number")
+    return check_identifier(parts[3], "service instance"), GloveKeys(parts[1], parts[5]).glove, int(term)
+
+
 def admission_key(site: str) -> str:
     """Liveliness token of the router of a site with certificates: who sees it is let in there."""
     return f"{ROOT}/{check_identifier(site, 'site')}/service/router/admits"

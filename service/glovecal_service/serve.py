@@ -1,7 +1,7 @@
 """``glovecal serve``: starts the service's processes, restarts one that dies, stops all of them cleanly.
 
-Three processes, none of which needs another to be alive: real time (zenoh router and prediction), recorder
-(its disk and database must never make a pose wait) and web (REST).
+Processes, none of which needs another to be alive but for the router: real time (zenoh router and prediction;
+more than one share the gloves), recorder (its disk and database must never make a pose wait) and web (REST).
 
 On Linux they are forked from this process, which has imported what real time needs: a fresh interpreter takes
 a second for that, on a busy computer five, in which there are no poses. This process opens no zenoh session,
@@ -138,6 +138,7 @@ def serve(settings: Settings) -> int:
     """Run until asked to stop, as by Ctrl-C; the exit code. What no restart cures is told in one sentence."""
     parts = [
         Part("real time", real_time, ("zenoh", *_zenoh_address(settings))),
+        *(Part(f"real time {number}", more_real_time) for number in range(2, settings.realtime + 1)),
         Part("recorder", recorder),
         Part("web", web, ("REST", settings.host, settings.port)),
     ]
@@ -324,7 +325,7 @@ def _keep_alive(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     part.start_at = now + delay_s
     why = _port_problem(part) if part.failed_starts else ""
     ending = f"exit code {code}: {why}" if why else f"exit code {code}"
-    if part.work is real_time:
+    if part.work in (real_time, more_real_time):
         Restarts(settings.data).note()
     _log.warning("%s ended (%s); starting it again in %.2g s", Word(part.name), Word(ending), delay_s)
 
@@ -378,6 +379,13 @@ def real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -
     from glovecal_service.realtime.process import run_real_time
 
     run_real_time(settings, stopped, started)
+
+
+def more_real_time(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:
+    """A further process that has a share of the gloves."""
+    from glovecal_service.realtime.process import run_more_real_time
+
+    run_more_real_time(settings, stopped, started)
 
 
 def recorder(settings: Settings, stopped: Event, started: Callable[[], None]) -> None:

@@ -40,6 +40,8 @@ class Settings(BaseSettings):
     """Object store URL, such as ``s3://bucket/prefix``; None: the folder ``artifacts`` in ``data``."""
     zenoh: str = "tcp/127.0.0.1:7447"
     """Endpoint of the router that the service runs."""
+    realtime: Annotated[int, Field(ge=1, le=64)] = 1
+    """Processes that predict, each on a core of its own; they share the gloves."""
     site: str = "lab"
     """Second part of every zenoh key."""
     site_file: Path | None = None

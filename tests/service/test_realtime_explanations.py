@@ -186,7 +186,7 @@ def test_an_uncalibrated_glove_has_no_angle(session: zenoh.Session, settings: Se
 def test_who_asks_too_much_is_refused_and_never_queued() -> None:
     """Without the thread that answers, so that all wait."""
     with zenoh.open(_alone()) as session:
-        waiting = LiveExplanations(session, "lab", list)
+        waiting = LiveExplanations(session, "lab", list, lambda _: True)
         got = [session.get("glovecal/lab/g1/pose/explain", timeout=0.5) for _ in range(QUERIES_WAITING + 1)]
         said = [
             reply.err.payload.to_string() for replies in got for reply in replies if reply.err is not None

@@ -34,6 +34,8 @@ class Arrivals:
     """A subscription whose messages wait until ``wait`` or ``drain`` takes them; for one reading thread."""
 
     def __init__(self, session: zenoh.Session, key_expression: str, *, limit: int = ARRIVALS_LIMIT) -> None:
+        self.left_out: set[str] = set()
+        """Keys whose messages are thrown away unread."""
         self._session = session
         self._limit = limit
         self._clock_id = str(session.zid())
@@ -76,6 +78,9 @@ class Arrivals:
         wall_less_monotonic_ns = wall_ns() - now_ns
         taken: list[Arrival] = []
         for sample in samples:
+            key = str(sample.key_expr)
+            if key in self.left_out:
+                continue
             payload = sample.payload.to_bytes()
             if payload != self._alarm_payload:
                 received_ns = (
@@ -83,7 +88,7 @@ class Arrivals:
                 )
                 # whatever a stamp says, it came after the look before and is here now
                 received_ns = min(max(received_ns, looked_ns), now_ns)
-                taken.append(Arrival(str(sample.key_expr), payload, received_ns))
+                taken.append(Arrival(key, payload, received_ns))
         return taken
 
     def _stamped_ns(self, sample: zenoh.Sample, now_ns: int) -> int:

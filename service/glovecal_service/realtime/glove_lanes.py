@@ -22,6 +22,7 @@ from glovecal_client.keys import GloveKeys, parse_glove_key
 from glovecal_client.wire.frame import RUN_ID_BYTES, Frame, decode_frame
 from glovecal_models.diagnosis.worn_glove import GloveFinding, live_findings
 from glovecal_service.incoming.frame_gate import FrameGate, Refusal, RefusalCount, Refused, Standing
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.incoming.rate_limit import MOST_HZ, RateLimit
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
@@ -47,6 +48,11 @@ class GlovePipeline:
     def __init__(self, keys: GloveKeys) -> None:
         self.keys = keys
         self.glove = keys.glove
+        self.term = 0
+        """Since this process has the glove."""
+        self.is_taken_over = False
+        """From another process, and nobody has looked yet which model it is to have here."""
+        self.first_received_ns = 0
         self.gate = FrameGate()
         self.refusals = RefusalCount(keys.glove)
         self.received = 0
@@ -176,6 +182,7 @@ class GlovePipeline:
             "run_id": None if run_id is None else f"{run_id:016x}",
             "runs": self.gate.runs,
             "jumps": self.gate.jumps,
+            "term": self.term,
             "sequence": self.gate.sequence,
             "model": self.model_id,
             "effects": None if effects is None else effects.status(),
@@ -259,6 +266,7 @@ GLOVES_LIMIT = 256
 VALID_WITHIN_NS = 1_000_000_000
 """A glove keeps its place for so long after a valid frame, against any number of new names."""
 LOG_EVERY_S = 10.0
+_MOST_LEFT_OUT = 4096
 _PARTS_SHOWN = 80
 
 _log = logging.getLogger("glovecal.realtime")
@@ -269,9 +277,13 @@ class GlovePipelines:
 
     A glove with a place has sent a valid frame, or nobody else wanted the place so far. So junk on any number
     of names keeps nobody out, and never displaces a glove that sends frames.
+    Gloves that another process has are in ``left_out``.
     """
 
-    def __init__(self, limit: int = GLOVES_LIMIT) -> None:
+    def __init__(self, owners: GloveOwners | None = None, limit: int = GLOVES_LIMIT) -> None:
+        """``owners``: None where this process has them all."""
+        self.left_out: set[str] = set()
+        self._owners, self._known_version = owners, -1
         self._limit = limit
         self._by_key: dict[str, GlovePipeline] = {}
         self._full_until_ns = 0
@@ -291,6 +303,17 @@ class GlovePipelines:
         lane = self._by_key.get(key)
         return lane if lane is not None else self._admit(key, message, received_ns)
 
+    def follow_owners(self) -> None:
+        """Let go what another process took over, and look again at what others have."""
+        owners = self._owners
+        if owners is None or owners.version == self._known_version:
+            return
+        self._known_version = owners.version
+        self.left_out.clear()
+        kept = owners.kept(lane.glove for lane in self._by_key.values())
+        for key in [key for key, lane in self._by_key.items() if lane.glove not in kept]:
+            del self._by_key[key]
+
     def document(self) -> dict[str, Any]:
         """For the status document: what was refused before it had a glove, and gloves that made room."""
         return {
@@ -308,11 +331,19 @@ class GlovePipelines:
             self._unusable_names += 1
             self._say("name", f"frames are refused: {str(error)[:_PARTS_SHOWN]}")
             return None
+        if self._owners is not None and not self._owners.may_take(keys.glove):
+            if len(self.left_out) >= _MOST_LEFT_OUT:
+                self.left_out.clear()
+            self.left_out.add(key)
+            return None
         if len(self._by_key) >= self._limit and not self._make_room(keys.glove, message, received_ns):
             self._no_room += 1
             return None
         lane = self._by_key[key] = GlovePipeline(keys)
+        lane.first_received_ns = received_ns
         lane.valid_ns = received_ns if _is_frame(message) else 0
+        if self._owners is not None:
+            lane.term, lane.is_taken_over = self._owners.take(keys.glove)
         return lane
 
     def _make_room(self, glove: str, message: bytes, received_ns: int) -> bool:
@@ -331,6 +362,8 @@ class GlovePipelines:
             )
             return False
         del self._by_key[key]
+        if self._owners is not None:
+            self._owners.leave(lane.glove)
         self._given_up += 1
         self._given_up_messages += lane.received
         why = "its last valid frame is more than 1 s old" if lane.valid_ns else "it sent no valid frame"

@@ -36,8 +36,15 @@ _log = logging.getLogger("glovecal.realtime")
 class LiveExplanations:
     """Answers ``glovecal/<site>/<glove>/pose/explain?rotations=I_PIP,T_IP``; without names, all rotations."""
 
-    def __init__(self, session: zenoh.Session, site: str, lanes: Callable[[], list[GlovePipeline]]) -> None:
-        self._lanes = lanes
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        lanes: Callable[[], list[GlovePipeline]],
+        is_mine: Callable[[str], bool],
+    ) -> None:
+        """``is_mine``: whether this process speaks for a glove; of others it says nothing."""
+        self._lanes, self._is_mine = lanes, is_mine
         self._asked = Condition()
         self._queries: dict[str, list[zenoh.Query]] = {}
         hear = zenoh.handlers.Callback(self._hear, indirect=False)
@@ -62,6 +69,9 @@ class LiveExplanations:
             glove = parse_glove_key(str(query.key_expr))[0].glove
         except BadName as error:
             _refuse(query, f"ask about one glove: {error}")
+            return
+        if not self._is_mine(glove):
+            query.drop()
             return
         with self._asked:
             waiting = self._queries.get(glove)

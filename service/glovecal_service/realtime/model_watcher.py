@@ -296,7 +296,9 @@ class ModelWatcher:
         models: ServedModels,
         pose_metas: PoseMetas,
         worn: WornGloves,
+        is_mine: Callable[[str], bool],
     ) -> None:
+        """``is_mine``: whether this process speaks for a glove."""
         self.database_problem = ""
         """Why the store does not answer, "" while it does."""
         self._open_store = open_store
@@ -306,6 +308,7 @@ class ModelWatcher:
         self._models = models
         self._pose_metas = pose_metas
         self._worn = worn
+        self._is_mine = is_mine
         self._revision: int | None = None
         self._gloves: set[str] = set()
         self._unnoted: set[str] = set()
@@ -328,13 +331,14 @@ class ModelWatcher:
     def look(self) -> None:
         """One look; problems end up in ``database_problem`` and in the gloves' sentences."""
         lanes = self._lanes()
-        changed = self._metas.news(lanes)
+        changed = set(filter(self._is_mine, self._metas.news(lanes)))
         self._unnoted |= changed
         self._to_choose |= {glove for glove in changed if not self._is_camera(glove)}
         for each in lanes:
             each.declare_rate((self._metas.of(each.glove) or {}).get("rate_hz"))
         heard = {lane.glove for lane in lanes if lane.gate.run_id is not None}  # not names with junk only
-        self._forget([glove for glove in self._gloves - heard if self._metas.of(glove) is None])
+        gone = [glove for glove in self._gloves - heard if self._metas.of(glove) is None]
+        self._forget(gone + [glove for glove in self._gloves - heard if not self._is_mine(glove)])
         self._to_choose |= heard - self._gloves
         try:
             self._follow(self._opened())
@@ -351,7 +355,7 @@ class ModelWatcher:
             self._gloves.discard(glove)
             self._troubled_at.pop(glove, None)
             self._not_stored.pop(glove, None)
-            self._models.put(glove, None)
+            self._models.forget(glove)
             self._pose_metas.forget(glove)
             self._worn.forget(glove)
             self._metas.forget(glove)
@@ -367,7 +371,7 @@ class ModelWatcher:
         changes = store.changes_since(self._revision)
         self._to_choose |= self._concerned(changes)
         if changes.are_of("glove"):
-            self._unnoted |= self._metas.proven() - store.gloves.names()
+            self._unnoted |= set(filter(self._is_mine, self._metas.proven() - store.gloves.names()))
         late = time.monotonic() - TRY_AGAIN_AFTER_S
         self._to_choose |= {glove for glove, at in self._troubled_at.items() if at < late}
         self._look_at_artifacts(store)

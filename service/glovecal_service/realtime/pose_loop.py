@@ -38,6 +38,7 @@ from glovecal_models.calibration.predictor import GloveAngles
 from glovecal_models.calibration.servable import LARGEST_DEG
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
 from glovecal_service.incoming.frame_gate import Refusal, Refused
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.realtime.frame_record import Effects
 from glovecal_service.realtime.glove_lanes import GlovePipeline, GlovePipelines
 from glovecal_service.realtime.lane_effects import LaneEffects, WornGloves
@@ -46,6 +47,7 @@ from glovecal_service.realtime.served_model import ServedModel, ServedModels
 OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with the budget of a round this keeps a pose younger than 50 ms."""
 ROUND_BUDGET_S = 0.020
+MODEL_WITHIN_NS = 2_000_000_000
 STALE_AFTER_NS = 500_000_000
 STALE_AGAIN_NS = 1_000_000_000
 _COLLECT_EVERY_NS = 10_000_000_000
@@ -74,6 +76,7 @@ class PoseLoop:
         publish: PublishPose,
         worn: WornGloves,
         *,
+        owners: GloveOwners | None = None,
         oldest_ns: int = OLDEST_NS,
         round_budget_s: float = ROUND_BUDGET_S,
     ) -> None:
@@ -82,7 +85,8 @@ class PoseLoop:
         self._models = models
         self._publish = publish
         self._worn = worn
-        self.gloves = GlovePipelines()
+        self.gloves = GlovePipelines(owners)
+        arrivals.left_out = self.gloves.left_out
         self._pending: dict[GlovePipeline, None] = {}
         self._looked_for_stale_ns = 0
         self._collected_ns = clock_ns()
@@ -109,6 +113,7 @@ class PoseLoop:
         self._housekeeping()
 
     def _enqueue(self, arrivals: Iterable[Arrival]) -> None:
+        self.gloves.follow_owners()
         for arrival in arrivals:
             lane = self.gloves.of(arrival.key, arrival.payload, arrival.received_ns)
             if lane is not None and lane.add(arrival.payload, arrival.received_ns):
@@ -120,7 +125,8 @@ class PoseLoop:
         lanes = [lane for lane in self._pending if self._models.of(lane.glove) is model]
         if model is None:
             for lane in lanes:
-                self._serve_uncalibrated(lane)
+                if not self._waits_for_a_model(lane):
+                    self._serve_uncalibrated(lane)
             return
         lanes = lanes[: model.pace.frames_within(self._round_budget_s)]
         # several frames of each glove only while all models have had a turn within the budget
@@ -188,7 +194,7 @@ class PoseLoop:
             late_ns = self._worn.of(lane.glove).latency_ns
             message = encode_around(
                 of_frame, frame.sequence, frame.run_id, frame.monotonic_ns - late_ns, frame.wall_ns - late_ns,
-                model.name_in_pose, flags, lane.skipped_in_run, _age_us(received_ns - late_ns),
+                model.name_in_pose, flags, lane.skipped_in_run, _age_us(received_ns - late_ns), lane.term,
             )  # fmt: skip
             self._publish(lane.glove, message)
             lane.note_pose(message, received_ns, model.model_id)
@@ -199,6 +205,17 @@ class PoseLoop:
                 record.served(angles.row(row))
                 lane.record = None
 
+    def _waits_for_a_model(self, lane: GlovePipeline) -> bool:
+        """Of a glove that had angles elsewhere, frames are skipped until it is known by which model: poses
+        without angles in between would be seen."""
+        if lane.is_taken_over:
+            late = clock_ns() - lane.first_received_ns > MODEL_WITHIN_NS
+            lane.is_taken_over = not late and not self._models.is_chosen(lane.glove)
+        if lane.is_taken_over:
+            self._pending.pop(lane)
+            lane.newest(0, 0)
+        return lane.is_taken_over
+
     def _serve_uncalibrated(self, lane: GlovePipeline) -> None:
         lane.effects = None
         late_ns = self._worn.of(lane.glove).latency_ns
@@ -207,6 +224,7 @@ class PoseLoop:
             pose = Pose(
                 frame.sequence, frame.run_id, frame.monotonic_ns - late_ns, frame.wall_ns - late_ns,
                 flags=flags, skipped=lane.skipped_in_run, age_us=_age_us(received_ns - late_ns),
+                term=lane.term,
             )  # fmt: skip
             message = encode_pose(pose)
             self._publish(lane.glove, message)

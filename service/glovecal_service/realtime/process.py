@@ -11,11 +11,14 @@ from threading import Event, Thread
 
 import zenoh
 
-from glovecal_client.keys import GloveKeys, all_gloves, service_alive_key
+from glovecal_client.errors import NoAnswer
+from glovecal_client.keys import GloveKeys, all_gloves
 from glovecal_client.publishers import Publishers
+from glovecal_client.session import open_client
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.incoming.arrivals import Arrivals
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.logs import Word
 from glovecal_service.operating_system import go_first
 from glovecal_service.plain import reason_of
@@ -45,25 +48,36 @@ def run_real_time(settings: Settings, stopped: Event, started: Callable[[], None
     pin_blas_to_one_thread()
     sys.setswitchinterval(GIL_SWITCH_S)
     go_first()
-    instance = f"realtime-{secrets.token_hex(4)}"
     with service_router(settings) as (session, router):
-        token = session.liveliness().declare_token(service_alive_key(settings.site, instance))
-        _serve(session, settings, instance, stopped, started, router)
-        token.undeclare()
+        _serve(session, settings, stopped, started, router)
+
+
+def run_more_real_time(settings: Settings, stopped: Event, started: Callable[[], None] | None = None) -> None:
+    """Serve a share of the gloves beside ``run_real_time``, at its router. Raises as it does."""
+    pin_blas_to_one_thread()
+    sys.setswitchinterval(GIL_SWITCH_S)
+    go_first()
+    try:
+        with open_client([settings.zenoh], cancelled=stopped.is_set) as session:
+            _serve(session, settings, stopped, started, None)
+    except NoAnswer:
+        if not stopped.is_set():
+            raise
 
 
 def _serve(
     session: zenoh.Session,
     settings: Settings,
-    instance: str,
     stopped: Event,
     started: Callable[[], None] | None,
     router: SiteRouter | None,
 ) -> None:
+    instance = f"realtime-{secrets.token_hex(4)}"
+    owners = GloveOwners(session, settings.site, instance)
     models = ServedModels()
     arrivals = Arrivals(session, all_gloves(settings.site, "raw"))
     worn = WornGloves()
-    loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish, worn)
+    loop = PoseLoop(arrivals, models, PosePublishers(session, settings.site).publish, worn, owners=owners)
     pose_metas = PoseMetas(session, settings.site)
     publishers = Publishers(session, all_gloves(settings.site, "alive"))
     metas = GloveMetas(session, settings.site, publishers)
@@ -74,6 +88,7 @@ def _serve(
         models,
         pose_metas,
         worn,
+        owners.is_mine,
     )
     status = ServiceStatus(
         session,
@@ -85,10 +100,12 @@ def _serve(
         publishers,
         lambda: watcher.database_problem,
         settings.data,
+        owners.is_mine,
     )
-    explanations = LiveExplanations(session, settings.site, lambda: loop.lanes)
+    explanations = LiveExplanations(session, settings.site, lambda: loop.lanes, owners.is_mine)
     rules = [] if router is None else [("site rules", router.follow)]
     _settle_garbage()
+    owners.announce()
     failures: list[str] = []
     threads = [
         _thread(name, work, stopped, failures)
@@ -103,6 +120,7 @@ def _serve(
     if started is not None:
         started()
     stopped.wait()
+    owners.close()
     for thread in threads:
         thread.join(5.0)
     arrivals.close()

@@ -134,18 +134,23 @@ class ServedModels:
     """Which model each glove has. Written by the model watcher, read between frames; a swap is one store."""
 
     def __init__(self) -> None:
-        self._models: dict[str, ServedModel] = {}
+        self._models: dict[str, ServedModel | None] = {}
 
     def of(self, glove: str) -> ServedModel | None:
         return self._models.get(glove)
 
+    def is_chosen(self, glove: str) -> bool:
+        """Whether somebody has looked which model the glove is to have, if only that there is none."""
+        return glove in self._models
+
     def put(self, glove: str, model: ServedModel | None) -> None:
         """Serve ``glove`` with ``model`` from its next frame on; None makes it uncalibrated."""
-        if model is None:
-            self._models.pop(glove, None)
-        else:
-            self._models[glove] = model
+        self._models[glove] = model
+
+    def forget(self, glove: str) -> None:
+        self._models.pop(glove, None)
 
     def in_use(self) -> dict[tuple[str, tuple[str, ...]], ServedModel]:
         """The prepared models by model id and order of the sensors."""
-        return {(model.model_id, model.sensors): model for model in list(self._models.values())}
+        models = filter(None, list(self._models.values()))
+        return {(model.model_id, model.sensors): model for model in models}

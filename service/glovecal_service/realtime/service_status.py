@@ -189,13 +189,15 @@ class ServiceStatus:
         publishers: Publishers,
         problem: Callable[[], str],
         data: Path,
+        is_mine: Callable[[str], bool],
     ) -> None:
+        """``is_mine``: whether this process speaks for a glove."""
         self._key = service_status_key(site, instance)
         self._instance = instance
         self._gloves = gloves
         self._pose_metas = pose_metas
         self._metas = metas
-        self._problem = problem
+        self._problem, self._is_mine = problem, is_mine
         self._alive_file = data / ALIVE_FILE
         self._started_wall_ns = wall_ns()
         self._reports = CaptureReports(session, site, publishers)
@@ -228,7 +230,9 @@ class ServiceStatus:
                     for name in ("state", "subject", "wearing", "layout", "sentence")
                 },
             }
-            for glove in sorted(lanes.keys() | metas.keys() | self._reports.gloves())
+            for glove in sorted(
+                lanes.keys() | set(filter(self._is_mine, metas.keys() | self._reports.gloves()))
+            )
         }
         return {
             "instance": self._instance,

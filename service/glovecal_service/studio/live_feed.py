@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import Any
 
@@ -131,7 +131,8 @@ class LiveFeeds:
         self._statuses: dict[str, tuple[float, dict[str, Any]]] = {}
         """Of these, those to believe."""
         self._publishers: Publishers | None = None
-        self._accounts: tuple[float, Mapping[str, Any]] = (-LOST_AFTER_S, {})
+        self._accounts: dict[str, tuple[float, Any]] = {}
+        """What the process that has a glove said of it last, and when."""
 
     def open(self, glove: str) -> GloveFeed:
         """The feed of ``glove``; ``release`` it. Waits for the router. Raises NoAnswer, BadName."""
@@ -161,10 +162,10 @@ class LiveFeeds:
         self._connected()
         self._believe()
         now, states = time.monotonic(), {}
-        said, accounts = self._accounts
         for glove, (heard, status) in sorted(self._statuses.copy().items()):
             feed = self._feeds.get(glove, (None, 0))[0]
-            account = accounts.get(glove) if now - said < LOST_AFTER_S else None
+            said, account = self._accounts.get(glove, (-LOST_AFTER_S, None))
+            account = account if now - said < LOST_AFTER_S else None
             states[glove] = glove_state(
                 status, now - heard > LOST_AFTER_S, None if feed is None else feed.pose,
                 feed is not None and feed.is_stale, account if isinstance(account, dict) else None,
@@ -179,7 +180,7 @@ class LiveFeeds:
 
     def _run_of(self, glove: str) -> str:
         """Whose frames come, as the service says."""
-        account = self._accounts[1].get(glove)
+        _, account = self._accounts.get(glove, (0.0, None))
         return str(account.get("run_id")) if isinstance(account, dict) else ""
 
     def explain(self, glove: str, rotation: str) -> dict[str, Any]:
@@ -253,5 +254,6 @@ class LiveFeeds:
 
     def _hear_account(self, sample: zenoh.Sample) -> None:
         gloves = (json_object(sample.payload.to_bytes()) or {}).get("gloves")
-        if isinstance(gloves, dict):
-            self._accounts = time.monotonic(), gloves
+        for glove, account in gloves.items() if isinstance(gloves, dict) else ():
+            if glove in self._accounts or len(self._accounts) < 2 * MOST_GLOVES:
+                self._accounts[glove] = time.monotonic(), account

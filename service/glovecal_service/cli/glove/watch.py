@@ -63,7 +63,7 @@ class _Counts:
     def __init__(self, session: zenoh.Session, site: str, glove: str) -> None:
         import zenoh
 
-        from glovecal_client.session import ask_json
+        from glovecal_client.session import ask
         from glovecal_service.realtime.service_status import all_service_statuses
 
         self.newest: dict[str, int] | None = None
@@ -72,7 +72,8 @@ class _Counts:
         handler = zenoh.handlers.Callback(self._hear, indirect=True)
         self._subscriber = session.declare_subscriber(all_service_statuses(site), handler)
         with suppress(NoAnswer):
-            self._note(ask_json(session, all_service_statuses(site), timeout_s=1.0))
+            for answer in ask(session, all_service_statuses(site), timeout_s=1.0):
+                self._hear(answer)
 
     def _hear(self, sample: zenoh.Sample) -> None:
         from glovecal_client.session import json_object
@@ -80,7 +81,9 @@ class _Counts:
         self._note(json_object(sample.payload.to_bytes()) or {})
 
     def _note(self, status: dict[str, Any]) -> None:
-        counts = status.get("gloves", {}).get(self._glove, {})
+        counts = status.get("gloves", {}).get(self._glove)
+        if counts is None:  # another process has the glove
+            return
         self.warnings = [f"{one['sentence']} {one['advice']}" for one in counts.get("warnings", [])]
         if "sent" in counts:
             names = ("sent", "received", "missing", "predicted", "skipped")

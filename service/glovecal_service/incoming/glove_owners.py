@@ -1,0 +1,189 @@
+"""Which process of a site has a glove: one at a time, found by each of them without asking anybody.
+
+Each process has a liveliness token. Of those that are there, the glove belongs to the one whose name and the
+glove's have the largest hash (rendezvous hashing, Thaler and Ravishankar 1998): when a process goes only its
+gloves move, and when one comes it gets its share of all. It says that it has a glove by a token with a term,
+higher than all it has seen of that glove; where two have one for a moment, the higher term has it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterable
+from threading import RLock
+
+import zenoh
+
+from glovecal_client.errors import BadName
+from glovecal_client.keys import (
+    all_services,
+    all_terms,
+    parse_service_key,
+    parse_term_key,
+    service_alive_key,
+    term_key,
+)
+
+SETTLED_WITHIN_S = 2.0
+AGAIN_AFTER_S = 1.0
+"""A glove that another took over is not taken back at once: both may be right by what they know."""
+MOST_GLOVES = 4096
+_TERMS_END = 1 << 32
+
+
+class GloveOwners:
+    """The gloves of one process, ``instance``. For any thread; ``version`` changes with whatever changes."""
+
+    def __init__(self, session: zenoh.Session, site: str, instance: str) -> None:
+        """Knows all others when this returns, and is known to them once it is ``announce``d."""
+        self.version = 0
+        self._session, self._site, self._instance = session, site, instance
+        self._lock = RLock()
+        self._others: set[str] = set()
+        self._terms: dict[str, dict[str, int]] = {}
+        """Of the others, by glove and process."""
+        self._highest: dict[str, int] = {}
+        """Term ever seen of a glove."""
+        self._mine: dict[str, tuple[int, object]] = {}
+        """Term and token."""
+        self._lost: list[object] = []
+        """Tokens to take back, on a thread that may."""
+        self._lost_at: dict[str, float] = {}
+        self._token: object | None = None
+        hear = zenoh.handlers.Callback
+        tokens = session.liveliness()
+        self._subscribers = [
+            tokens.declare_subscriber(
+                all_services(site), hear(self._hear_process, indirect=False), history=True
+            ),
+            tokens.declare_subscriber(all_terms(site), hear(self._hear_term, indirect=False), history=True),
+        ]
+        for key in (all_services(site), all_terms(site)):
+            for reply in tokens.get(key, timeout=SETTLED_WITHIN_S):
+                if reply.ok is not None:
+                    (self._hear_process if key == all_services(site) else self._hear_term)(reply.ok)
+
+    def announce(self) -> None:
+        """From now on the others leave this process its share."""
+        key = service_alive_key(self._site, self._instance)
+        self._token = self._session.liveliness().declare_token(key)
+
+    def close(self) -> None:
+        """Leave all gloves to the others."""
+        with self._lock:
+            tokens = [token for _, token in self._mine.values()] + self._lost
+            self._mine.clear()
+            self._lost.clear()
+        for each in filter(None, [self._token, *tokens, *self._subscribers]):
+            each.undeclare()  # type: ignore[attr-defined]
+
+    def is_mine(self, glove: str) -> bool:
+        """Whether this process speaks for the glove, with frames or without."""
+        with self._lock:
+            if glove in self._mine:
+                return True
+            return glove not in self._terms and self._is_next(glove)
+
+    def may_take(self, glove: str) -> bool:
+        """Whether it is this process' turn to have a glove whose frames come."""
+        with self._lock:
+            late_s = time.monotonic() - self._lost_at.get(glove, -AGAIN_AFTER_S)
+            return glove in self._mine or (late_s >= AGAIN_AFTER_S and self._is_next(glove))
+
+    def take(self, glove: str) -> tuple[int, bool]:
+        """Take a glove over: its term, and whether another process had it before."""
+        with self._lock:
+            had = self._mine.get(glove)
+            if had is not None:
+                return had[0], False
+            before = self._highest.get(glove, 0)
+            term = max(before + 1, int(time.time())) % _TERMS_END
+            self._note_highest(glove, term)
+        token = self._session.liveliness().declare_token(term_key(self._site, self._instance, glove, term))
+        with self._lock:
+            self._mine[glove] = term, token
+            self._yield_if_overruled(glove)
+        return term, before > 0
+
+    def leave(self, glove: str) -> None:
+        """Of no use here any more."""
+        with self._lock:
+            _, token = self._mine.pop(glove, (0, None))
+        if token is not None:
+            token.undeclare()  # type: ignore[attr-defined]
+
+    def kept(self, gloves: Iterable[str]) -> set[str]:
+        """Those that this process still has; says of the others that it has them no more."""
+        with self._lock:
+            kept = {glove for glove in gloves if glove in self._mine}
+            lost = [*self._lost]
+            self._lost.clear()
+        for token in lost:
+            token.undeclare()  # type: ignore[attr-defined]
+        return kept
+
+    def _is_next(self, glove: str) -> bool:
+        mine = _weight(self._instance, glove)
+        return all(_weight(other, glove) < mine for other in self._others)
+
+    def _note_highest(self, glove: str, term: int) -> None:
+        if glove not in self._highest and len(self._highest) >= MOST_GLOVES:
+            self._highest.clear()
+        self._highest[glove] = max(term, self._highest.get(glove, 0))
+
+    def _hear_process(self, sample: zenoh.Sample) -> None:
+        try:
+            process = parse_service_key(str(sample.key_expr))
+        except BadName:
+            return
+        if process == self._instance or _kind(process) != _kind(self._instance):
+            return
+        with self._lock:
+            self.version += 1
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._others.add(process)
+                return
+            self._others.discard(process)
+            for glove in [glove for glove, terms in self._terms.items() if process in terms]:
+                self._forget_term(glove, process)
+
+    def _hear_term(self, sample: zenoh.Sample) -> None:
+        try:
+            process, glove, term = parse_term_key(str(sample.key_expr))
+        except BadName:
+            return
+        if process == self._instance or _kind(process) != _kind(self._instance):
+            return
+        with self._lock:
+            self.version += 1
+            if sample.kind != zenoh.SampleKind.PUT:
+                if self._terms.get(glove, {}).get(process) == term:
+                    self._forget_term(glove, process)
+            elif glove in self._terms or len(self._terms) < MOST_GLOVES:
+                self._terms.setdefault(glove, {})[process] = term
+                self._note_highest(glove, term)
+                self._yield_if_overruled(glove)
+
+    def _forget_term(self, glove: str, process: str) -> None:
+        del self._terms[glove][process]
+        if not self._terms[glove]:
+            del self._terms[glove]
+
+    def _yield_if_overruled(self, glove: str) -> None:
+        term, token = self._mine.get(glove, (0, None))
+        others = [(other, process) for process, other in self._terms.get(glove, {}).items()]
+        if token is not None and others and max(others) > (term, self._instance):
+            del self._mine[glove]
+            self._lost.append(token)
+            self._lost_at[glove] = time.monotonic()
+            self.version += 1
+
+
+def _kind(instance: str) -> str:
+    """Of ``realtime-0c5f``: each kind of process has owners of its own."""
+    return instance.partition("-")[0]
+
+
+def _weight(instance: str, glove: str) -> bytes:
+    return hashlib.blake2b(f"{instance}/{glove}".encode(), digest_size=8).digest()
