@@ -1,8 +1,9 @@
 """zenoh sessions with nothing left to chance: explicit endpoints, no scouting, always closed.
 
-Everything at the edge (capture, subscribers, tools) is a client of one router, which the service runs: peers
-do not relay for each other since zenoh 1.9. A question that gets no answer is a failure. With a site's file
-(``GLOVECAL_SITE_FILE``) every connection is encrypted and both sides show a certificate.
+Everything at the edge (capture, subscribers, tools) is a client of one router, which the service runs, or of
+one of several that are linked: peers do not relay for each other since zenoh 1.9. A question that gets no
+answer is a failure. With a site's file (``GLOVECAL_SITE_FILE``) every connection is encrypted and both sides
+show a certificate.
 """
 
 from __future__ import annotations
@@ -42,9 +43,10 @@ def client_config(
 ) -> zenoh.Config:
     """A client of the router at ``endpoints``; nothing is bound, no scouting, no shared memory.
 
-    Of a site's ``member``: encrypted, and only to a router that its authority signed.
+    Of several the first that answers; when it goes, another. Of a site's ``member``: encrypted, and only to a
+    router that its authority signed.
     """
-    settings: dict[str, Any] = {"endpoints": list(endpoints), "timeout_ms": _ATTEMPT_MS, "retry": _RETRY}
+    settings: dict[str, Any] = {"endpoints": _each(endpoints), "timeout_ms": _ATTEMPT_MS, "retry": _RETRY}
     if member is not None:
         settings["endpoints"] = reached_endpoints(endpoints, member)
     connect = {f"connect/{name}": value for name, value in settings.items()}
@@ -54,12 +56,14 @@ def client_config(
 def router_config(
     endpoints: Sequence[str] = (DEFAULT_ENDPOINT,),
     *,
+    peers: Sequence[str] = (),
     max_put_bytes: int = MAX_PUT_BYTES,
     member: Member | None = None,
     rules: Rules | None = None,
 ) -> zenoh.Config:
     """A router that listens on ``endpoints`` and refuses puts over ``max_put_bytes``.
 
+    It links itself to the routers at ``peers``, whenever they are there, so that both are one for all others.
     With a site's ``member`` and ``rules`` it asks everybody for a certificate and lets each do what the rules
     say.
     """
@@ -70,19 +74,31 @@ def router_config(
         "key_exprs": ["**"],
         "size_limit": max_put_bytes,
     }
-    listen = list(endpoints) if member is None else [encrypted(endpoint) for endpoint in endpoints]
-    settings: dict[str, Any] = {"listen/endpoints": listen, "connect/endpoints": []}
+    listen, linked = list(endpoints), list(peers)
+    if member is not None:
+        listen, linked = [*map(encrypted, endpoints)], [*map(encrypted, peers)]
+    settings: dict[str, Any] = {"listen/endpoints": listen, "connect/endpoints": linked}
+    if linked:
+        settings |= {"connect/timeout_ms": 0, "connect/exit_on_failure": False, "connect/retry": _RETRY}
     if rules is not None:
         settings["access_control"] = rules.access_control()
-    return _config("router", settings | {"low_pass_filter": [limit]} | _certificates(member, "listen"))
+    return _config(
+        "router", settings | {"low_pass_filter": [limit]} | _certificates(member, "listen", "connect")
+    )
 
 
-def _certificates(member: Member | None, side: str) -> dict[str, Any]:
+def _each(endpoints: Sequence[str]) -> list[str]:
+    """One text may name several, separated by commas."""
+    return [each.strip() for text in endpoints for each in text.split(",") if each.strip()]
+
+
+def _certificates(member: Member | None, *sides: str) -> dict[str, Any]:
     """As text in zenoh's configuration: no private key lies in a file of its own."""
     if member is None:
         return {}
     own = {"private_key": member.private_key, "certificate": member.certificate}
-    texts = {"root_ca_certificate": member.authority} | {f"{side}_{name}": pem for name, pem in own.items()}
+    texts = {f"{side}_{name}": pem for side in sides for name, pem in own.items()}
+    texts["root_ca_certificate"] = member.authority
     settings: dict[str, Any] = {
         f"{name}_base64": base64.b64encode(pem.encode()).decode() for name, pem in texts.items()
     }
@@ -107,7 +123,7 @@ def reached_endpoints(endpoints: Sequence[str], member: Member) -> list[str]:
     if tuple(endpoints) == (DEFAULT_ENDPOINT,) and member.kind != "service":
         return list(member.zenoh)
     reached = []
-    for endpoint in map(encrypted, endpoints):
+    for endpoint in map(encrypted, _each(endpoints)):
         parts = _ENDPOINT.match(endpoint)
         assert parts is not None
         reached.append(f"tls/{_here(parts[2])}{parts[3]}")
@@ -225,10 +241,13 @@ def _require_no_refusal(member: Member, endpoints: Sequence[str]) -> None:
 
 @contextmanager
 def open_router(
-    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,), *, max_put_bytes: int = MAX_PUT_BYTES
+    endpoints: Sequence[str] = (DEFAULT_ENDPOINT,),
+    *,
+    peers: Sequence[str] = (),
+    max_put_bytes: int = MAX_PUT_BYTES,
 ) -> Iterator[zenoh.Session]:
     """A router session (itself a full participant) that is closed at the end of the ``with`` block."""
-    session = zenoh.open(router_config(endpoints, max_put_bytes=max_put_bytes))
+    session = zenoh.open(router_config(endpoints, peers=peers, max_put_bytes=max_put_bytes))
     try:
         yield session
     finally:

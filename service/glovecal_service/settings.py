@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sqlalchemy import URL
 
 
+_ENDPOINT = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):[0-9]{1,5}\Z")
 _HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
 LONGEST_ISSUER = 255
 _LONGEST_SECRET = 4096
@@ -40,6 +41,8 @@ class Settings(BaseSettings):
     """Object store URL, such as ``s3://bucket/prefix``; None: the folder ``artifacts`` in ``data``."""
     zenoh: str = "tcp/127.0.0.1:7447"
     """Endpoint of the router that the service runs."""
+    zenoh_peers: str = ""
+    """Endpoints of the routers of other services of the site, separated by commas: they share the gloves."""
     realtime: Annotated[int, Field(ge=1, le=64)] = 1
     """Processes that predict, each on a core of its own; they share the gloves."""
     site: str = "lab"
@@ -102,6 +105,14 @@ class Settings(BaseSettings):
     def _site_fits_into_a_key(cls, site: str) -> str:
         return check_identifier(site, "GLOVECAL_SITE")
 
+    @field_validator("zenoh_peers")
+    @classmethod
+    def _peers_are_endpoints(cls, peers: str) -> str:
+        for each in filter(None, (part.strip() for part in peers.split(","))):
+            if not _ENDPOINT.match(each):
+                raise ValueError(f"{each!r} is no endpoint of a router, such as tls/lab-2.example:7447")
+        return peers
+
     @field_validator("scheduler")
     @classmethod
     def _scheduler_is_protected(cls, scheduler: str | None, info: ValidationInfo) -> str | None:
@@ -158,6 +169,11 @@ class Settings(BaseSettings):
             if name in info.data and not info.data[name]:
                 raise ValueError(f"people of that provider log in only with GLOVECAL_{name.upper()}, too")
         return issuer
+
+    @property
+    def linked_routers(self) -> list[str]:
+        """Endpoints."""
+        return [each.strip() for each in self.zenoh_peers.split(",") if each.strip()]
 
     @property
     def oidc_secret(self) -> str:

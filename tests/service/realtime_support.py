@@ -17,7 +17,7 @@ import zenoh
 
 from glovecal_client.capture.device import Reading
 from glovecal_client.keys import GloveKeys, all_services
-from glovecal_client.session import ask_json
+from glovecal_client.session import ask, ask_json, json_object
 from glovecal_client.wire.frame import Frame, encode_frame
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel
@@ -117,7 +117,19 @@ class WireGlove:
         )
 
     def say_meta(self, **changes: Any) -> None:
-        meta = {
+        self._session.put(self.keys.meta, json.dumps(self.meta() | changes))
+
+    def answer_meta(self) -> zenoh.Queryable:
+        """To whoever asks, as a capture daemon does."""
+
+        def answer(query: zenoh.Query) -> None:
+            with query:
+                query.reply(self.keys.meta, json.dumps(self.meta()))
+
+        return self._session.declare_queryable(self.keys.meta, answer)
+
+    def meta(self) -> dict[str, Any]:
+        return {
             "glove": self.keys.glove,
             "layout": LAYOUT.name,
             "sensors": list(LAYOUT.sensors),
@@ -127,7 +139,6 @@ class WireGlove:
             "simulated": False,
             "run_id": f"{self.run_id:016x}",
         }
-        self._session.put(self.keys.meta, json.dumps(meta | changes))
 
     def restart(self) -> None:
         """As when its capture is started again: another run, which may say something else of itself."""
@@ -161,7 +172,10 @@ def service_status(session: zenoh.Session, settings: Settings) -> dict[str, Any]
 
 
 def glove_status(session: zenoh.Session, settings: Settings, glove: str) -> dict[str, Any]:
-    return service_status(session, settings)["gloves"].get(glove, {})
+    """By the process that has the glove."""
+    key = all_services(settings.site).removesuffix("alive") + "status"
+    told = (json_object(answer.payload.to_bytes()) or {} for answer in ask(session, key))
+    return next((gloves[glove] for each in told if glove in (gloves := each["gloves"])), {})
 
 
 class SteadyDevice:

@@ -85,7 +85,7 @@ def settle_environment() -> None:
     if member is not None:
         os.environ.setdefault("GLOVECAL_SITE", member.site)
         if member.kind != "service":
-            os.environ.setdefault("GLOVECAL_ZENOH", member.zenoh[0])
+            os.environ.setdefault("GLOVECAL_ZENOH", ",".join(member.zenoh))
             os.environ.setdefault("GLOVECAL_URL", member.rest)
 
 

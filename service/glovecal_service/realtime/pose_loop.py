@@ -212,8 +212,7 @@ class PoseLoop:
             late = clock_ns() - lane.first_received_ns > MODEL_WITHIN_NS
             lane.is_taken_over = not late and not self._models.is_chosen(lane.glove)
         if lane.is_taken_over:
-            self._pending.pop(lane)
-            lane.newest(0, 0)
+            lane.skip(len(self._open(lane, 1)))
         return lane.is_taken_over
 
     def _serve_uncalibrated(self, lane: GlovePipeline) -> None:

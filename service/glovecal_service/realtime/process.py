@@ -6,6 +6,7 @@ import gc
 import logging
 import secrets
 import sys
+import time
 from collections.abc import Callable
 from threading import Event, Thread
 
@@ -36,6 +37,8 @@ from glovecal_service.store.store import Store
 GIL_SWITCH_S = 0.0005
 """Longest time another thread of this process keeps a frame waiting (Python's default is ten times that)."""
 
+LINKED_WITHIN_S = 1.0
+
 _log = logging.getLogger("glovecal.realtime")
 
 
@@ -49,7 +52,17 @@ def run_real_time(settings: Settings, stopped: Event, started: Callable[[], None
     sys.setswitchinterval(GIL_SWITCH_S)
     go_first()
     with service_router(settings) as (session, router):
+        _wait_for_links(session, settings, stopped)
         _serve(session, settings, stopped, started, router)
+
+
+def _wait_for_links(session: zenoh.Session, settings: Settings, stopped: Event) -> None:
+    """A moment for the other routers that are there: or this process would take their gloves first and give
+    them back when it hears of them."""
+    until = time.monotonic() + LINKED_WITHIN_S
+    while settings.linked_routers and time.monotonic() < until and not stopped.wait(0.02):
+        if len(list(session.info.routers_zid())) >= len(settings.linked_routers):
+            return
 
 
 def run_more_real_time(settings: Settings, stopped: Event, started: Callable[[], None] | None = None) -> None:

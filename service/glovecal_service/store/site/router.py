@@ -43,7 +43,8 @@ class SiteRouter:
         self.session.liveliness().declare_token(admission_key(settings.site))
 
     def _open(self) -> zenoh.Session:
-        return zenoh.open(router_config([self._settings.zenoh], member=self._member, rules=self._rules))
+        listen, peers = [self._settings.zenoh], self._settings.linked_routers
+        return zenoh.open(router_config(listen, peers=peers, member=self._member, rules=self._rules))
 
     def _members(self) -> tuple[Admitted, ...]:
         return self._folder.register().admitted
@@ -75,7 +76,7 @@ class SiteRouter:
 def service_router(settings: Settings) -> Iterator[tuple[zenoh.Session, SiteRouter | None]]:
     """The router's session, and who keeps its rules; None for a service without certificates."""
     if settings.site_file is None:
-        with open_router([settings.zenoh]) as session:
+        with open_router([settings.zenoh], peers=settings.linked_routers) as session:
             yield session, None
         return
     router = SiteRouter(settings, settings.site_file)
