@@ -1,13 +1,14 @@
 """Frames in, poses out, through the running service and real zenoh: latency, age, and where every frame went.
 
-    python tests/bench/streaming_bench.py [--gloves 16,32,64] [--seconds S] [--quick] [--smoke] [--json FILE]
+    python tests/bench/streaming_bench.py [--gloves 16,32,64] [--processes N] [--seconds S] [--quick]
+                                          [--smoke] [--json FILE]
 
-Two processes: the real-time process of the product, and one that stands for all gloves and all readers of
-poses (``streaming_load.py``). Latency is from just before a frame's ``put`` to the pose callback (two hops
-and a prediction, one machine, so one clock); age is what the pose states. Models have 22 rotations with 100
-nodes each, and are those of 8 people; with ``--gloves`` they hold two effects with a memory too. The overload
-case serves models so large that the machine manages half of what is sent. Whether memory grows after the
-first minute: ``--gloves 64 --seconds 600``.
+Two processes: the real-time process of the product (with ``--processes`` several), and one that stands for
+all gloves and all readers of poses (``streaming_load.py``). Latency is from just before a frame's ``put`` to
+the pose callback (two hops and a prediction, one machine, so one clock); age is what the pose states. Models
+have 22 rotations with 100 nodes each, and are those of 8 people; with ``--gloves`` they hold two effects with
+a memory too. The overload case serves models so large that the machine manages half of what is sent. Whether
+memory grows after the first minute: ``--gloves 64 --seconds 600``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import operator
 import os
 import socket
 import tempfile
+from collections import ChainMap, Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -30,14 +32,14 @@ from effects_cost import FRAMES, cost_of_effects, everywhere, sentence
 from streaming_load import Load, ProcessCost, drive
 
 from glovecal_client.keys import all_services
-from glovecal_client.session import ask_json, open_client
+from glovecal_client.session import ask, json_object, open_client
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.covariance.functions import SquaredExponentialArd
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_models.worker_processes import pin_blas_to_one_thread
-from glovecal_service.serve import Lifeline, real_time, run_part
+from glovecal_service.serve import Lifeline, Work, more_real_time, real_time, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store.store import Store
 
@@ -61,6 +63,7 @@ class Case:
     seconds: float
     nodes: int = 100
     effects: bool = False
+    processes: int = 1
     targets: tuple[tuple[str, str, float], ...] = ()
     """(figure, "<=", ">=" or "==", value)."""
 
@@ -68,6 +71,7 @@ class Case:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--gloves", type=_numbers, help="only so many gloves with effects, such as 16,32,64")
+    parser.add_argument("--processes", type=int, default=1, help="that predict, with --gloves; default 1")
     parser.add_argument("--seconds", type=float, help="length of a run with --gloves; default 20")
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument(
@@ -80,7 +84,7 @@ def main() -> None:
     print(sentence(effects), flush=True)
     results: list[dict[str, Any]] = []
     smoke = map(run, [Case("2 gloves, smoke test", 2, 120.0, 1.0, nodes=10, effects=True)])
-    cases = run_all(arguments.gloves, arguments.seconds, quick=arguments.quick)
+    cases = run_all(arguments.gloves, arguments.seconds, arguments.processes, quick=arguments.quick)
     for result in smoke if arguments.smoke else cases:
         print_result(result)
         results.append(result)
@@ -93,7 +97,9 @@ def _numbers(text: str) -> list[int]:
     return [int(part) for part in text.split(",")]
 
 
-def run_all(gloves: list[int] | None, seconds: float | None, *, quick: bool) -> Iterator[dict[str, Any]]:
+def run_all(
+    gloves: list[int] | None, seconds: float | None, processes: int, *, quick: bool
+) -> Iterator[dict[str, Any]]:
     """The cases in turn; figures with their targets."""
     long, short = (10.0, 5.0) if quick else (60.0, 20.0)
     if not gloves:
@@ -103,7 +109,7 @@ def run_all(gloves: list[int] | None, seconds: float | None, *, quick: bool) -> 
         )  # fmt: skip
         yield run(two)
     for count in gloves or [16, 32, 64]:
-        yield run(_gloves_case(count, seconds or short))
+        yield run(_gloves_case(count, seconds or short, processes))
     if not gloves:
         capacity = run(Case("large models, as many frames as it can", 8, 250.0, 5.0, nodes=400))
         yield capacity
@@ -115,12 +121,13 @@ def run_all(gloves: list[int] | None, seconds: float | None, *, quick: bool) -> 
         yield run(overload)
 
 
-def _gloves_case(count: int, seconds: float) -> Case:
+def _gloves_case(count: int, seconds: float, processes: int) -> Case:
     targets = [("age_p99_ms", "<=", 25.0), ("predicted_share", ">=", 0.99), ("unaccounted", "==", 0)]
     if seconds > FIRST_MINUTE_S:
         targets.append(("memory_growth_mib", "<=", 5.0))
     name = f"{count} gloves at 120 Hz, {PEOPLE} models with {' and '.join(EFFECTS)}"
-    return Case(name, count, 120.0, seconds, effects=True, targets=tuple(targets))
+    name += f", {processes} processes" if processes > 1 else ""
+    return Case(name, count, 120.0, seconds, effects=True, processes=processes, targets=tuple(targets))
 
 
 def run(case: Case) -> dict[str, Any]:
@@ -128,17 +135,21 @@ def run(case: Case) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="glovecal-bench-") as folder, ExitStack() as running:
         settings = Settings(data=Path(folder), zenoh=f"tcp/127.0.0.1:{free_port()}")
         store_models(settings, case)
-        process = running.enter_context(service(settings))
+        first = running.enter_context(service(settings))
+        more = [running.enter_context(service(settings, more_real_time)) for _ in range(1, case.processes)]
         load = Load(settings.zenoh, settings.site, case.gloves, PEOPLE, case.rate_hz, case.seconds)
         driver, driving = running.enter_context(helper(drive, load))
         driver.recv()
-        with ProcessCost(process) as cost, ProcessCost(driving) as load_cost:
+        costs = [ProcessCost(process) for process in (first, *more)]
+        with ProcessCost(driving) as load_cost, ExitStack() as counting:
+            for cost in costs:
+                counting.enter_context(cost)
             driver.send("start")
             sent = driver.recv()
         status = _service_status(settings)
         driver.send("enough")
         latency_ms, age_ms = driver.recv()
-    figures = _figures(case, sent, status, latency_ms, age_ms) | _cost_figures(case, cost, status)
+    figures = _figures(case, sent, status, latency_ms, age_ms) | _cost_figures(case, costs, status)
     figures["load_cpu_cores"] = sum(load_cost.cpu_s.values()) / case.seconds
     return figures | {"targets": _targets(case, figures)}
 
@@ -167,14 +178,18 @@ def _figures(
     }
 
 
-def _cost_figures(case: Case, cost: ProcessCost, status: dict[str, Any]) -> dict[str, Any]:
+def _cost_figures(case: Case, costs: list[ProcessCost], status: dict[str, Any]) -> dict[str, Any]:
+    """Memory is that of the first process."""
     predicted = sum(glove["predicted"] for glove in status["gloves"].values())
+    by_thread = Counter[str]()
+    for cost in costs:
+        by_thread.update(cost.cpu_s)
     return {
-        "cpu_cores": sum(cost.cpu_s.values()) / case.seconds,
-        "cpu_us_per_frame": 1e6 * sum(cost.cpu_s.values()) / max(predicted, 1),
-        "cpu_s_by_thread": {name: round(spent, 2) for name, spent in sorted(cost.cpu_s.items())},
-        "memory_mib": [round(mib, 1) for _, mib in cost.memory],
-        "memory_growth_mib": cost.growth_mib(FIRST_MINUTE_S),
+        "cpu_cores": sum(by_thread.values()) / case.seconds,
+        "cpu_us_per_frame": 1e6 * sum(by_thread.values()) / max(predicted, 1),
+        "cpu_s_by_thread": {name: round(spent, 2) for name, spent in sorted(by_thread.items())},
+        "memory_mib": [round(mib, 1) for _, mib in costs[0].memory],
+        "memory_growth_mib": costs[0].growth_mib(FIRST_MINUTE_S),
     }
 
 
@@ -281,11 +296,11 @@ def _random_rotation(
 
 
 @contextmanager
-def service(settings: Settings) -> Iterator[int]:
+def service(settings: Settings, work: Work = real_time) -> Iterator[int]:
     """The id of the real-time process."""
     ready = SPAWN.Event()
     end, held = SPAWN.Pipe(duplex=False)
-    process = SPAWN.Process(target=run_part, args=(real_time, settings, ready, Lifeline(end, None)))
+    process = SPAWN.Process(target=run_part, args=(work, settings, ready, Lifeline(end, None)))
     process.start()
     try:
         if not ready.wait(60) or process.pid is None:
@@ -317,7 +332,8 @@ def helper(work: Callable[..., None], *arguments: Any) -> Iterator[tuple[Any, in
 def _service_status(settings: Settings) -> dict[str, Any]:
     with open_client([settings.zenoh]) as session:
         key = all_services(settings.site).removesuffix("alive") + "status"
-        return ask_json(session, key, timeout_s=5.0)
+        told = (json_object(answer.payload.to_bytes()) or {} for answer in ask(session, key, timeout_s=5.0))
+        return {"gloves": dict(ChainMap(*(each["gloves"] for each in told)))}
 
 
 def free_port() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import subprocess
 import sys
 import threading
@@ -16,6 +17,7 @@ from glovecal_client import DamagedLog, Frame, FrameLog, Recording, encode_frame
 from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.recorder.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -58,7 +60,8 @@ def recording_thread(settings: Settings) -> Iterator[Recorder]:
     """The recorder as its process runs it."""
     stop = threading.Event()
     with open_client([settings.zenoh], wait_s=20) as session:
-        it = Recorder(session, settings, lambda: Store.open(settings))
+        owners = GloveOwners(session, settings.site, f"recorder-{secrets.token_hex(4)}")
+        it = Recorder(session, settings, lambda: Store.open(settings), owners)
         thread = threading.Thread(target=it.run, args=(stop,))
         thread.start()
         try:

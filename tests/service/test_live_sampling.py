@@ -15,6 +15,7 @@ from glovecal_client.session import open_router
 from glovecal_models.sampling.catalogue import make_protocol
 from glovecal_models.sampling.engine import Sampling, begin_sampling
 from glovecal_models.sampling.state import SamplingState
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.recorder.sampling_runner import LiveSampling, SamplingRunner
 from glovecal_service.store import Store
 
@@ -63,7 +64,8 @@ def test_a_sampling_that_fails_is_closed_with_the_reason_and_the_next_goes_on(
         state = begin_sampling(make_protocol("fk_only", LAYOUT), LAYOUT.sensors)
         made = {"glove": GLOVE, "subject": "anna", "wearing": "", "layout": LAYOUT.name}
         first = store.samplings.create(**made, document=state.to_document())
-        runner = SamplingRunner(session, settings, lambda: Store.open(settings))
+        owners = GloveOwners(session, settings.site, "recorder-1")
+        runner = SamplingRunner(session, settings, lambda: Store.open(settings), owners)
         with monkeypatch.context() as broken:
             broken.setattr(LiveSampling, "look", lambda self, store: 1 // 0)
             runner.look()

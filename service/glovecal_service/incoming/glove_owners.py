@@ -91,6 +91,24 @@ class GloveOwners:
             late_s = time.monotonic() - self._lost_at.get(glove, -AGAIN_AFTER_S)
             return glove in self._mine or (late_s >= AGAIN_AFTER_S and self._is_next(glove))
 
+    def has(self, glove: str) -> bool:
+        """Whether it was taken and is not lost."""
+        with self._lock:
+            return glove in self._mine
+
+    def is_elsewhere(self, glove: str) -> bool:
+        """Whether another process that is there has it."""
+        with self._lock:
+            return glove in self._terms
+
+    def may_begin(self, glove: str, among: str = "") -> bool:
+        """As ``may_take`` for work that stays where it began: not while another process has the glove.
+
+        ``among``: only processes whose names begin so take turns.
+        """
+        with self._lock:
+            return glove in self._mine or (glove not in self._terms and self._is_next(glove, among))
+
     def take(self, glove: str) -> tuple[int, bool]:
         """Take a glove over: its term, and whether another process had it before."""
         with self._lock:
@@ -123,9 +141,10 @@ class GloveOwners:
             token.undeclare()  # type: ignore[attr-defined]
         return kept
 
-    def _is_next(self, glove: str) -> bool:
+    def _is_next(self, glove: str, among: str = "") -> bool:
         mine = _weight(self._instance, glove)
-        return all(_weight(other, glove) < mine for other in self._others)
+        rivals = (other for other in self._others if other.startswith(among))
+        return all(_weight(other, glove) < mine for other in rivals)
 
     def _note_highest(self, glove: str, term: int) -> None:
         if glove not in self._highest and len(self._highest) >= MOST_GLOVES:

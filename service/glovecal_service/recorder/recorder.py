@@ -5,7 +5,11 @@ Its disk, its database and its Python never make a pose wait.
 
 from __future__ import annotations
 
+import hashlib
 import logging
+import math
+import secrets
+import socket
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -23,6 +27,7 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.session import ask_json, open_client
 from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.logs import Word
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.live_recording import LiveRecording
@@ -41,8 +46,9 @@ from glovecal_service.store.errors import (
     StoreDamaged,
     StoreError,
     StoreUnavailable,
+    TakenOver,
 )
-from glovecal_service.store.recordings import ENDED_BY, PRE_ROLL, STOP_ASKED
+from glovecal_service.store.recordings import ENDED_BY, KEEPER, PRE_ROLL, STOP_ASKED
 from glovecal_service.store.records import RecordingRecord
 from glovecal_service.store.store import Store
 
@@ -56,6 +62,9 @@ FINISH_WITHIN_S = 5.0
 """For the account and the pre-roll; ten minutes of it at 120 Hz come in about as long."""
 NOTICED_AFTER_S = 2 * LOOK_EVERY_S
 """A recorder that runs sees a stop by then, and so long one that did not run would have recorded."""
+TAKE_OVER_AFTER_S = 10.0
+"""Of what a recorder elsewhere began: one that died is back sooner, and has the file. What it only repairs
+stays with it: the frames are there and perhaps nowhere else."""
 MOST_AT_ONCE = 32
 
 _log = logging.getLogger("glovecal.recorder")
@@ -80,12 +89,26 @@ class Pause:
 class Recorder:
     """One thread for all recordings. ``look`` does a round of work; call it again and again."""
 
-    def __init__(self, session: zenoh.Session, settings: Settings, open_store: Callable[[], Store]) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        settings: Settings,
+        open_store: Callable[[], Store],
+        owners: GloveOwners,
+    ) -> None:
+        self._owners = owners
+        self._place = _place(settings)
+        self._keeper = f"{socket.gethostname()}:{settings.recordings_folder.resolve()}"
         self._session = session
         self._settings = settings
         self._open_store = open_store
         self._store: Store | None = None
         self._revision: int | None = None
+        self._owners_version = -1
+        self._away_since: dict[str, float] = {}
+        """By recordings of others: since when nobody has the glove."""
+        self._others_at = math.inf
+        """When to look again whether what another recorder has is still reported on."""
         self._looked_at = 0.0
         self._reported_at = 0.0
         self._live: dict[str, LiveRecording] = {}
@@ -142,12 +165,54 @@ class Recorder:
     def _follow(self, store: Store) -> None:
         changes = store.changes_since(self._revision)
         if changes.are_of("recording") or self._is_anything_due():
-            settled = [self._move(store, record) for record in _sound(store.recordings.unsettled)]
+            self._owners_version = self._owners.version
+            records = _sound(store.recordings.unsettled)
+            mine = [record for record in records if self._is_mine(record)]
+            self._away_since = {
+                each.id: self._away_since[each.id] for each in records if each.id in self._away_since
+            }
+            self._others_at = math.inf if len(mine) == len(records) else time.monotonic() + REPORT_EVERY_S
+            settled = [self._move(store, record) for record in mine]
             self._revision = changes.revision if all(settled) else None
         else:
             self._revision = changes.revision
 
+    def _is_mine(self, record: RecordingRecord) -> bool:
+        """Whether this recorder is to go on with it, and has its glove from then on."""
+        glove, keeper = record.glove, record.facts.get(KEEPER)
+        if record.id in {*self._live, *self._settling, *self._pauses}:
+            if not self._owners.has(glove):
+                self._let_go(record.id, "another recorder has its glove")
+            return self._owners.has(glove)
+        if keeper in (None, self._keeper):
+            is_mine = self._owners.may_begin(glove, among="" if keeper is None else self._place)
+        else:
+            is_mine = self._is_abandoned(record) and self._owners.may_begin(glove)
+        if is_mine:
+            self._owners.take(glove)
+        return is_mine
+
+    def _is_abandoned(self, record: RecordingRecord) -> bool:
+        """Whether the recorder that began it has been away for long."""
+        is_there = record.state == "repairing" or self._owners.is_elsewhere(record.glove)
+        since = self._away_since.setdefault(record.id, time.monotonic())
+        if is_there or (now() - record.updated_at).total_seconds() < TAKE_OVER_AFTER_S:
+            self._away_since[record.id] = time.monotonic()
+            return False
+        return time.monotonic() - since > TAKE_OVER_AFTER_S
+
+    def _let_go(self, id: str, why: str) -> None:
+        """What was written of it stays in its file."""
+        _log.warning("recording %s is let go: %s", id, why)
+        live = self._live.pop(id, None)
+        if live is not None:
+            live.abandon()
+        self._settling.pop(id, None)
+        self._pauses.pop(id, None)
+
     def _is_anything_due(self) -> bool:
+        if self._owners.version != self._owners_version or time.monotonic() >= self._others_at:
+            return True
         return any(future.done() for future in self._settling.values()) or any(
             pause.is_over and id not in self._settling for id, pause in self._pauses.items()
         )
@@ -165,6 +230,8 @@ class Recorder:
                 self._end(record)
         except (StoreUnavailable, SQLAlchemyError):
             raise
+        except TakenOver as error:
+            self._let_go(record.id, str(error))
         except StorageFull as error:
             self._note(record.id, sentence=f"goes on as soon as there is room: {error}")
             self._looked_at = time.monotonic() + REPORT_EVERY_S
@@ -176,13 +243,18 @@ class Recorder:
     def _begin(self, store: Store, record: RecordingRecord) -> None:
         """Record from now on, or go on with the file of a recorder that was killed, or end that."""
         path = self._path(record)
+        if record.facts.get(KEEPER) not in (None, self._keeper):
+            _log.warning("recording %s goes on here: %s is silent", record.name, record.facts[KEEPER])
+            record = store.recordings.take_over(record, self._keeper)
+            if record.state == "stopping" and not path.exists():
+                self._create(store, record, path).close()
         interrupted = path.exists()
         if record.state == "stopping" and not interrupted:
             raise BadInput(f"recording {record.name} was stopped before it began: nothing was recorded")
         silent_s = (now() - record.updated_at).total_seconds()
         if record.state == "recording" and silent_s > RESUME_WITHIN_S:
             note = f"ended with its last frame: no recorder was running for {silent_s:.0f} s"
-            record = store.recordings.update(record.id, state="stopping", **{ENDED_BY: note})
+            record = self._update(store, record.id, state="stopping", **{ENDED_BY: note})
         if record.state == "stopping":
             self._settling[record.id] = self._threads.submit(
                 settle,
@@ -199,12 +271,16 @@ class Recorder:
             return RunLedger.resume(path, known) if interrupted else self._create(store, record, path)
 
         live = self._live[record.id] = LiveRecording(self._session, self._keys(record), file)
-        facts = {}
+        facts: dict[str, Any] = {} if BEGIN not in live.file.meta else {BEGIN: live.file.meta[BEGIN]}
         if interrupted:
             facts["interruptions"] = [*record.facts.get("interruptions", []), _interruption(live.file)]
         what = Word("resumed" if interrupted else "began")
         _log.info("recording %s of glove %s %s", record.name, record.glove, what)
-        store.recordings.update(record.id, state="recording", sentence="recording", **facts)
+        self._update(store, record.id, state="recording", sentence="recording", **facts)
+
+    def _update(self, store: Store, id: str, **changes: Any) -> RecordingRecord:
+        """Raises TakenOver where another recorder has it now."""
+        return store.recordings.update(id, keeper=self._keeper, **changes)
 
     def _keys(self, record: RecordingRecord) -> GloveKeys:
         return GloveKeys(self._settings.site, record.glove)
@@ -216,15 +292,18 @@ class Recorder:
         keys = self._keys(record)
         meta: dict[str, Any] = {"recording": record.id, "name": record.name, "glove": record.glove}
         meta[CREATED] = wall_ns()
+        if began := _begin_elsewhere(record):
+            meta[BEGIN] = began
         try:
             meta[CAPTURE] = ask_json(self._session, keys.meta, timeout_s=5.0)
             standing = CaptureLog(self._session, keys).standing()
-            meta[BEGIN] = {
+            now_there = {
                 "run_id": f"{standing.runs[-1].run_id:016x}",
                 "sequence": standing.sequence,
                 "wall_ns": wall_ns() + standing.clock_ahead_ns,
                 "clock_ahead_ns": standing.clock_ahead_ns,
             }
+            meta.setdefault(BEGIN, now_there)
         except NoAnswer:
             _log.info("recording %s of glove %s begins with its first frame", record.name, record.glove)
         others = _sound(lambda: store.recordings.list(record.glove))
@@ -278,9 +357,11 @@ class Recorder:
 
     def _keep(self, store: Store, record: RecordingRecord, settlement: Settlement) -> bool:
         """Store account and take; False if a user changed the take at this very moment: then once more."""
-        record = store.recordings.update(record.id, **settlement.account)
+        record = self._update(store, record.id, **settlement.account)
         try:
             facts = keep_as_take(store, record, settlement, self._settings.recordings_folder)
+        except TakenOver:
+            raise
         except Conflict:
             if "take" in record.facts:
                 return False
@@ -288,7 +369,7 @@ class Recorder:
         if facts["sentence"] != record.facts.get("sentence"):
             _log.info("recording %s: %s", record.name, facts["sentence"])
         state = "done" if settlement.is_final else "repairing"
-        store.recordings.update(record.id, state=state, **facts)
+        self._update(store, record.id, state=state, **facts)
         return True
 
     def _fail(self, store: Store, record: RecordingRecord, problem: str) -> None:
@@ -299,22 +380,24 @@ class Recorder:
         self._settling.pop(record.id, None)
         self._pauses.pop(record.id, None)
         account = {} if live is None else live.account()
-        store.recordings.update(record.id, state="failed", sentence=problem, **account)
+        self._update(store, record.id, state="failed", sentence=problem, **account)
 
     def _report(self, store: Store) -> None:
-        for id, live in self._live.items():
+        for id, live in list(self._live.items()):
             live.file.sync()
             problem = live.file.problem
             sentence = f"frames wait in memory: {problem}" if problem else "recording"
             try:
-                store.recordings.update(id, sentence=sentence, **live.account())
+                self._update(store, id, sentence=sentence, **live.account())
+            except TakenOver as error:
+                self._let_go(id, str(error))
             except StoreDamaged as error:  # its frames are written all the same, the others are reported
                 _log.warning("recording %s cannot be reported: %s", id, error)
 
     def _note(self, id: str, **facts: Any) -> None:
         _log.warning("recording %s: %s", id, facts)
         try:
-            self._opened().recordings.update(id, **facts)
+            self._update(self._opened(), id, **facts)
         except (StoreError, SQLAlchemyError, OSError):
             return
 
@@ -326,6 +409,25 @@ def _sound(recordings: Callable[[], list[RecordingRecord]]) -> list[RecordingRec
     except DamagedRows as error:
         _log.warning("recordings that cannot be read: %s", "; ".join(error.damaged))
         return error.sound
+
+
+def _place(settings: Settings) -> str:
+    """What the names of all recorders of a data folder begin with."""
+    folder = f"{socket.gethostname()}:{settings.recordings_folder.resolve()}"
+    return f"recorder-{hashlib.sha256(folder.encode()).hexdigest()[:8]}-"
+
+
+def _begin_elsewhere(record: RecordingRecord) -> dict[str, Any] | None:
+    """For the header: where it began, of a recording that another recorder began; None for a new one."""
+    if BEGIN in record.facts or not record.facts.get("runs"):
+        return record.facts.get(BEGIN)
+    first = record.facts["runs"][0]
+    return {
+        "run_id": first["run_id"],
+        "sequence": first["first_sequence"] - 1,
+        "wall_ns": round(record.requested_at.timestamp() * 1e9),
+        "clock_ahead_ns": 0,
+    }
 
 
 def _interruption(file: RunLedger) -> dict[str, Any]:
@@ -394,11 +496,14 @@ def run_recorder(settings: Settings, stopped: Event, started: Callable[[], None]
         with open_client([settings.zenoh], cancelled=stopped.is_set) as session:
             if started is not None:
                 started()
-            samplings = SamplingRunner(session, settings, lambda: Store.open(settings))
+            owners = GloveOwners(session, settings.site, f"{_place(settings)}{secrets.token_hex(4)}")
+            owners.announce()
+            samplings = SamplingRunner(session, settings, lambda: Store.open(settings), owners)
             thread = Thread(target=samplings.run, args=(stopped,), name="samplings", daemon=True)
             thread.start()
-            Recorder(session, settings, lambda: Store.open(settings)).run(stopped)
+            Recorder(session, settings, lambda: Store.open(settings), owners).run(stopped)
             thread.join(STOP_WITHIN_S)
+            owners.close()
     except NoAnswer:
         if not stopped.is_set():
             raise

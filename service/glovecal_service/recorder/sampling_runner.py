@@ -28,6 +28,7 @@ from glovecal_models.sampling.state import OVER, Choose, GloveReading, NextSteps
 from glovecal_models.sampling.verdict import TouchCheck
 from glovecal_models.takes.take import Take
 from glovecal_service.incoming.arrivals import Arrivals
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.plain import reason_of
 from glovecal_service.recorder.run_ledger import decoded
 from glovecal_service.settings import Settings
@@ -198,7 +199,13 @@ _log = logging.getLogger("glovecal.sampling")
 class SamplingRunner:
     """One thread for all samplings, beside the recorder's: it may stand still, the frames are written."""
 
-    def __init__(self, session: zenoh.Session, settings: Settings, open_store: Callable[[], Store]) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        settings: Settings,
+        open_store: Callable[[], Store],
+        owners: GloveOwners,
+    ) -> None:
         self._session = session
         self._site = settings.site
         self._open_store = open_store
@@ -206,6 +213,7 @@ class SamplingRunner:
         self._revision: int | None = None
         self._follow_at = 0.0
         self._live: dict[str, LiveSampling] = {}
+        self._owners, self._owners_version = owners, -1
 
     def run(self, stopped: Event) -> None:
         """Until ``stopped``; what goes on is left for the next process."""
@@ -231,10 +239,11 @@ class SamplingRunner:
 
     def _follow(self, store: Store) -> None:
         changes = store.changes_since(self._revision)
-        if not changes.are_of("sampling"):
+        if not changes.are_of("sampling") and self._owners.version == self._owners_version:
             self._revision = changes.revision
             return
-        records = {record.id: record for record in _open_samplings(store)}
+        self._owners_version = self._owners.version
+        records = {record.id: record for record in _open_samplings(store) if self._is_mine(record)}
         for id in [id for id in self._live if id not in records]:
             self._live.pop(id).close()
         for id, record in records.items():
@@ -249,6 +258,13 @@ class SamplingRunner:
             except (GlovecalError, ClientError, KeyError, TypeError, ValueError) as error:
                 self._give_up(store, record, f"the sampling cannot go on: {reason_of(error)}")
         self._revision = changes.revision
+
+    def _is_mine(self, record: SamplingRecord) -> bool:
+        """Whether this process is to go on with it, and has its glove from then on."""
+        if not self._owners.may_begin(record.glove):
+            return False
+        self._owners.take(record.glove)
+        return self._owners.has(record.glove)
 
     def _go_on(self, store: Store, live: LiveSampling) -> None:
         try:

@@ -43,6 +43,10 @@ class StoreDamaged(StoreError):
     """Something stored is not what was written."""
 
 
+class TakenOver(Conflict):
+    """Another process has what this one began."""
+
+
 class DamagedRows(StoreDamaged):
     """Some rows of a list are not what was written.
 

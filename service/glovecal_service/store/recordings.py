@@ -13,7 +13,7 @@ from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
 from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, new_id, now
-from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.errors import Conflict, NotFound, TakenOver
 from glovecal_service.store.records import (
     OPEN_RECORDING_STATES,
     TIME_CODE,
@@ -35,6 +35,8 @@ TRIGGER = "trigger"
 ``start`` and at its ``stop``, and when it came."""
 ENDED_BY = "ended_by"
 """Fact of a recording whose end nobody asked for: what ended it."""
+KEEPER = "keeper"
+"""Fact of a recording that began: computer and folder of the recorder that has its file."""
 PRE_ROLL_S = 60.0
 LONGEST_PRE_ROLL_S = 600.0
 
@@ -140,10 +142,28 @@ class Recordings:
                 )
             return _move(connection, id, None, {TIME_CODE: dict(code)})
 
-    def update(self, id: str, *, state: RecordingState | None = None, **facts: Any) -> RecordingRecord:
+    def take_over(self, seen: RecordingRecord, keeper: str) -> RecordingRecord:
+        """Let a recorder go on with what another one began and has not reported on since it was ``seen``.
+
+        Raises NotFound, TakenOver where somebody did.
+        """
+
+        def change(row: dict[str, Any]) -> dict[str, Any]:
+            if row["updated_at"] != seen.updated_at:
+                raise TakenOver(f"recording {seen.name!r} is reported on by another recorder")
+            return {"facts": {**row["facts"], KEEPER: keeper}, "updated_at": now()}
+
+        with self._database.write() as connection:
+            change_rows(connection, tables.recordings, tables.recordings.c.id == seen.id, change)
+            return _require(connection, seen.id)
+
+    def update(
+        self, id: str, *, keeper: str | None = None, state: RecordingState | None = None, **facts: Any
+    ) -> RecordingRecord:
         """Report what became of it: facts are merged, the state only moves forward.
 
-        So ``update(id, state="recording")`` of a recording that a user stopped meanwhile leaves it at
+        ``keeper``: the recorder that reports, which has it from now on; raises TakenOver where another one
+        has. So ``update(id, state="recording")`` of a recording that a user stopped meanwhile leaves it at
         ``stopping``: look at the record that comes back. Raises NotFound, BadInput.
         """
         if state is not None and state not in _ORDER:
@@ -151,7 +171,7 @@ class Recordings:
         with self._database.write() as connection:
             if state is not None:
                 tell_change(connection, "recording")
-            return _move(connection, id, state, facts)
+            return _move(connection, id, state, facts, keeper=keeper)
 
     def get(self, id: str) -> RecordingRecord:
         """Raises NotFound."""
@@ -183,9 +203,16 @@ def with_pre_roll(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _move(
-    connection: Connection, id: str, state: str | None, facts: dict[str, Any], name: str | None = None
+    connection: Connection,
+    id: str,
+    state: str | None,
+    facts: dict[str, Any],
+    name: str | None = None,
+    keeper: str | None = None,
 ) -> RecordingRecord:
     def change(row: dict[str, Any]) -> dict[str, Any]:
+        if keeper is not None and row["facts"].setdefault(KEEPER, keeper) != keeper:
+            raise TakenOver(f"recording {row['name']!r} goes on at {row['facts'][KEEPER]}")
         values: dict[str, Any] = {"facts": {**row["facts"], **facts}, "updated_at": now()}
         if state is not None and _ORDER[state] > _ORDER[row["state"]]:
             values["state"] = state

@@ -20,8 +20,9 @@ from glovecal_models.takes.take import Stretch, Take, poses_at_frames
 from glovecal_models.takes.time_code import TimeCode
 from glovecal_service.store import tables
 from glovecal_service.store.blobs import Artifacts, check_sha256
+from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, new_id, now
-from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.errors import Conflict, NotFound, TakenOver
 from glovecal_service.store.gloves import latency_of_take
 from glovecal_service.store.list_part import WHOLE, ListPart
 from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, NOTE, TIME_CODE, TakeRecord
@@ -67,7 +68,10 @@ class Takes:
         recording: str | None = None,
         facts: Mapping[str, Any] | None = None,
     ) -> TakeRecord:
-        """Keep one take: ``add_all`` of it alone, with what its recording has to say about it."""
+        """Keep one take: ``add_all`` of it alone, with what its recording has to say about it.
+
+        Raises TakenOver where that recording has its take already.
+        """
         (record,) = self._keep(
             [take],
             subject,
@@ -118,6 +122,8 @@ class Takes:
         ]
         with self._database.write() as connection:
             require_subject(connection, subject)
+            if shared["recording"] is not None:
+                _require_no_take(connection, shared["recording"])
             for take, record in zip(takes, records, strict=True):
                 _insert(connection, take, record)
         return records
@@ -381,6 +387,14 @@ def _check_keepable(take: Take) -> None:
     check_text(take.wearing, f"wearing of take {take.name!r}", empty=True)
     if len(take.time_s) == 0:
         raise BadInput(f"take {take.name!r} holds no frames")
+
+
+def _require_no_take(connection: Connection, recording: str) -> None:
+    tell_change(connection, "recording")  # one transaction after the other, on PostgreSQL too
+    table = tables.takes
+    there = connection.scalar(select(table.c.name).where(table.c.recording == recording).limit(1))
+    if there is not None:
+        raise TakenOver(f"the recording has a take already, {there!r}")
 
 
 def _insert(connection: Connection, take: Take, record: TakeRecord) -> None:

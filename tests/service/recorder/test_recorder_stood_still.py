@@ -24,6 +24,7 @@ from recorder_support import GLOVE, capturing, goes_on, logged, recording_thread
 from glovecal_client import Recording
 from glovecal_client.capture.device import Reading
 from glovecal_client.session import open_client, open_router
+from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.recorder.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -105,7 +106,8 @@ def test_a_stop_asked_for_meanwhile_ends_the_recording_there(settings: Settings,
         capturing(settings),
         open_client([settings.zenoh], wait_s=20) as session,
     ):
-        recorder = Recorder(session, settings, lambda: Store.open(settings))
+        owners = GloveOwners(session, settings.site, "recorder-1")
+        recorder = Recorder(session, settings, lambda: Store.open(settings), owners)
         asked = store.recordings.request(GLOVE, name="stopped meanwhile", lead_s=0)
 
         def until(state: str) -> None:
