@@ -6,7 +6,7 @@ import secrets
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from glovecal_client.capture.daemon import CaptureDaemon, CaptureSettings
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
 from glovecal_service.incoming.glove_owners import GloveOwners
+from glovecal_service.recorder import recorder
 from glovecal_service.recorder.recorder import Recorder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -69,6 +70,12 @@ def recording_thread(settings: Settings) -> Iterator[Recorder]:
         finally:
             stop.set()
             thread.join(120)
+
+
+def quick_recorder(settings: Settings, stopped: threading.Event, started: Callable[[], None]) -> None:
+    """The recorder process, which takes over what is abandoned after two seconds, not ten."""
+    recorder.TAKE_OVER_AFTER_S = 2.0
+    recorder.run_recorder(settings, stopped, started)
 
 
 def logged(settings: Settings) -> list[Path]:
