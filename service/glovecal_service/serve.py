@@ -140,6 +140,7 @@ def serve(settings: Settings) -> int:
         Part("real time", real_time, ("zenoh", *_zenoh_address(settings))),
         *(Part(f"real time {number}", more_real_time) for number in range(2, settings.realtime + 1)),
         Part("recorder", recorder),
+        *(Part(f"recorder {number}", recorder) for number in range(2, settings.recorders + 1)),
         Part("web", web, ("REST", settings.host, settings.port)),
     ]
     try:
@@ -209,7 +210,15 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
 
 
 def _others_problem(settings: Settings) -> str:
-    """Beyond loopback nobody is served without certificates; "" if all is well."""
+    """Beyond loopback nobody is served without certificates, and services that are linked keep things
+    together; "" if all is well."""
+    places = {"GLOVECAL_DATABASE": settings.database, "GLOVECAL_ARTIFACTS": settings.artifacts}
+    apart = [variable for variable, place in places.items() if not place]
+    if settings.linked_routers and apart:
+        return (
+            "GLOVECAL_ZENOH_PEERS links this service to others, which have the same models and takes only with "
+            f"one database and one object store: set {' and '.join(apart)}, too"
+        )
     for variable, host in (("GLOVECAL_HOST", settings.host), ("GLOVECAL_ZENOH", _zenoh_host(settings))):
         if settings.site_file is None and not is_loopback(host):
             return (

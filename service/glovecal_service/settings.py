@@ -45,6 +45,8 @@ class Settings(BaseSettings):
     """Endpoints of the routers of other services of the site, separated by commas: they share the gloves."""
     realtime: Annotated[int, Field(ge=1, le=64)] = 1
     """Processes that predict, each on a core of its own; they share the gloves."""
+    recorders: Annotated[int, Field(ge=1, le=64)] = 1
+    """Processes that record; they share the recordings."""
     site: str = "lab"
     """Second part of every zenoh key."""
     site_file: Path | None = None
