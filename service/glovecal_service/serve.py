@@ -216,8 +216,8 @@ def _others_problem(settings: Settings) -> str:
     apart = [variable for variable, place in places.items() if not place]
     if settings.linked_routers and apart:
         return (
-            "GLOVECAL_ZENOH_PEERS links this service to others, which have the same models and takes only with "
-            f"one database and one object store: set {' and '.join(apart)}, too"
+            "GLOVECAL_ZENOH_PEERS links this service to others, and they have the same models and takes with "
+            f"one database and one object store only: set {' and '.join(apart)}, too"
         )
     for variable, host in (("GLOVECAL_HOST", settings.host), ("GLOVECAL_ZENOH", _zenoh_host(settings))):
         if settings.site_file is None and not is_loopback(host):

@@ -310,8 +310,8 @@ class GlovePipelines:
             return
         self._known_version = owners.version
         self.left_out.clear()
-        kept = owners.kept(lane.glove for lane in self._by_key.values())
-        for key in [key for key, lane in self._by_key.items() if lane.glove not in kept]:
+        kept = owners.kept(each.glove for each in self._by_key.values())
+        for key in [key for key, each in self._by_key.items() if each.glove not in kept]:
             del self._by_key[key]
 
     def document(self) -> dict[str, Any]:

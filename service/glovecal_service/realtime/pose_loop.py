@@ -205,15 +205,15 @@ class PoseLoop:
                 record.served(angles.row(row))
                 lane.record = None
 
-    def _waits_for_a_model(self, lane: GlovePipeline) -> bool:
+    def _waits_for_a_model(self, glove: GlovePipeline) -> bool:
         """Of a glove that had angles elsewhere, frames are skipped until it is known by which model: poses
         without angles in between would be seen."""
-        if lane.is_taken_over:
-            late = clock_ns() - lane.first_received_ns > MODEL_WITHIN_NS
-            lane.is_taken_over = not late and not self._models.is_chosen(lane.glove)
-        if lane.is_taken_over:
-            lane.skip(len(self._open(lane, 1)))
-        return lane.is_taken_over
+        if glove.is_taken_over:
+            late = clock_ns() - glove.first_received_ns > MODEL_WITHIN_NS
+            glove.is_taken_over = not late and not self._models.is_chosen(glove.glove)
+        if glove.is_taken_over:
+            glove.skip(len(self._open(glove, 1)))
+        return glove.is_taken_over
 
     def _serve_uncalibrated(self, lane: GlovePipeline) -> None:
         lane.effects = None
