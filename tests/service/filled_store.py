@@ -20,7 +20,7 @@ def fill(store: Store) -> None:
     takes = [
         store.takes.add(
             make_take(number, f"t{number}"), subject="anna", layout=LAYOUT.name, source="import",
-            original_sha256="0" * 64, accounting={"sent": 300 + number}, recording="r1",
+            original_sha256="0" * 64, accounting={"sent": 300 + number}, recording=f"r{number}",
         )
         for number in range(2)
     ]  # fmt: skip

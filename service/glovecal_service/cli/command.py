@@ -21,7 +21,7 @@ import typer.main
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
 from glovecal_client.program import handle_signals, run_command
 from glovecal_client.site.member import settle_environment
-from glovecal_service.cli import completion, demo, overview, serve
+from glovecal_service.cli import backup, completion, demo, overview, serve
 from glovecal_service.cli.access import audit, encryption, keys, log_mark, people
 from glovecal_service.cli.asking import verb, verb_at_once
 from glovecal_service.cli.camera import cameras
@@ -105,6 +105,7 @@ app.add_typer(subjects.app, name="subject", rich_help_panel=KEEP)
 app.add_typer(jobs.app, name="job", rich_help_panel=KEEP)
 app.add_typer(keys.app, name="key", rich_help_panel=KEEP)
 app.add_typer(people.app, name="person", rich_help_panel=KEEP)
+app.add_typer(backup.app, name="backup", rich_help_panel=KEEP)
 app.add_typer(encryption.app, name="encryption", rich_help_panel=KEEP)
 app.add_typer(audit.app, name="audit", rich_help_panel=KEEP)
 app.command("log-mark", rich_help_panel=KEEP)(log_mark.log_mark)

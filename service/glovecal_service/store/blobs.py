@@ -241,6 +241,14 @@ class Artifacts:
             )
         return content
 
+    def get_kept(self, sha256: str) -> bytes | None:
+        """As it lies there, encrypted or not; None where there is none. Raises OSError, StoreUnavailable."""
+        return self._blobs.read(check_sha256(sha256))
+
+    def put_kept(self, sha256: str, kept: bytes) -> None:
+        """What ``get_kept`` gave of another store. Raises StorageFull, StoreUnavailable."""
+        self._blobs.write(check_sha256(sha256), kept)
+
     def _decrypted(self, sha256: str, kept: bytes) -> bytes:
         """What was changed comes as it lies there, and has another sha256."""
         try:
