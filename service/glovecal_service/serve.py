@@ -47,6 +47,7 @@ from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
 from glovecal_service.store.data_folder_lock import DataFolderLock, FolderInUse
+from glovecal_service.store.errors import StoreUnavailable
 from glovecal_service.store.site.site_folder import SiteFolder
 from glovecal_service.store.store import Store
 
@@ -59,6 +60,7 @@ QUICK_CRASHES = 20
 STOP_WITHIN_S = 10.0
 
 READY_WITHIN_S = 60.0
+DATABASE_WITHIN_S = 60.0
 
 Work = Callable[[Settings, Event, Callable[[], None]], None]
 """Runs until the event is set; calls the last argument when it is there for its users."""
@@ -198,7 +200,7 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     if settings.studio and find_spec("nicegui") is None:
         return f"{not_installed('the studio', 'nicegui')} (or leave it out: glovecal serve --no-studio)"
     try:
-        with Store.open(settings) as store:
+        with _store_that_answers(settings) as store:
             if asks_who(settings) and not (store.keys.has_admin or store.people.has_admin):
                 return (
                     f"on {settings.host} the service asks everybody who they are (GLOVECAL_HOST, "
@@ -207,6 +209,21 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
     return ""
+
+
+def _store_that_answers(settings: Settings) -> Store:
+    """Waits for a database server that is still starting. Raises as ``Store.open`` does."""
+    until, told = time.monotonic() + DATABASE_WITHIN_S, False
+    while True:
+        try:
+            return Store.open(settings)
+        except StoreUnavailable as error:
+            if settings.database is None or time.monotonic() > until:
+                raise
+            if not told:
+                _log.warning("waiting %.0f s for the database: %s", DATABASE_WITHIN_S, error)
+            told = True
+            time.sleep(0.5)
 
 
 def _others_problem(settings: Settings) -> str:

@@ -48,9 +48,12 @@ class PostgresServer:
                 time.sleep(0.2)
         raise RuntimeError(f"PostgreSQL does not start again: {(self.folder / 'log').read_text()[-500:]}")
 
+    def stop(self) -> None:
+        self._run("pg_ctl", "-w", "-t", "30", "-m", "immediate", "stop")
+
     def remove(self) -> None:
         if (self.folder / "data" / "postmaster.pid").exists():
-            self._run("pg_ctl", "-w", "-t", "30", "-m", "immediate", "stop")
+            self.stop()
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def new_database(self) -> str:

@@ -2,11 +2,14 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
 from jobs_waiting import wait_for
 from postgres_server import PostgresServer, find_programs
+from realtime_support import free_endpoint
 
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.dispatcher import Dispatcher
@@ -68,3 +71,27 @@ def test_a_server_that_is_not_there_is_named_without_its_password(tmp_path):
     for url in ("mysql://x", "not a url", "sqlite+aiosqlite:///x"):
         with pytest.raises(BadInput, match="GLOVECAL_DATABASE"):
             Database(url)
+
+
+def test_serve_waits_for_a_server_that_is_still_starting(own_postgres, tmp_path):
+    settings = {
+        "GLOVECAL_DATA": str(tmp_path / "data"),
+        "GLOVECAL_DATABASE": own_postgres.new_database(),
+        "GLOVECAL_PORT": free_endpoint().rpartition(":")[2],
+        "GLOVECAL_ZENOH": free_endpoint(),
+    }
+    own_postgres.stop()
+    command = [sys.executable, "-m", "glovecal_service.cli.command", "serve", "--no-studio"]
+    serving = subprocess.Popen(
+        command, env=os.environ | settings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert serving.stderr is not None
+        assert serving.stdout is not None
+        while "waiting 60 s for the database" not in (line := serving.stderr.readline()):
+            assert line, "it ended"
+        own_postgres.start()
+        assert serving.stdout.readline().startswith("Glovecal is running")
+    finally:
+        serving.kill()
+        serving.communicate()

@@ -55,6 +55,8 @@ def new_id() -> str:
 
 log = logging.getLogger("glovecal.store")
 BUSY_TIMEOUT_MS = 5000
+CONNECTED_WITHIN_S = 5
+"""With a server, in whole seconds; without it a network that swallows packets holds a request for minutes."""
 LEAST_ROOM_BYTES = 1 << 20
 """With less the disk is called full where SQLite speaks of an I/O error: its shared memory grows by 32 kB."""
 UNSTORABLE = (
@@ -168,7 +170,10 @@ def _engine(url: str | URL) -> Engine:
             parsed = parsed.set(drivername="postgresql+psycopg")
         if parsed.drivername not in ("sqlite", "sqlite+pysqlite", "postgresql+psycopg"):
             raise ArgumentError(f"driver {parsed.drivername!r} is not supported")
-        engine = create_engine(parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40)
+        patience = {} if parsed.get_backend_name() == "sqlite" else {"connect_timeout": CONNECTED_WITHIN_S}
+        engine = create_engine(
+            parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40, connect_args=patience
+        )
     except ModuleNotFoundError as error:
         raise BadInput(not_installed("GLOVECAL_DATABASE with PostgreSQL", "psycopg[binary]")) from error
     except (ArgumentError, NoSuchModuleError) as error:
