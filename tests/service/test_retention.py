@@ -8,10 +8,13 @@ import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from filled_store import META
 from stored_takes import LAYOUT, make_take
 
+from glovecal_client import Frame, FrameLog, encode_frame
+from glovecal_client.encryption.kept_file import open_kept
 from glovecal_service.filming import Filming
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -69,3 +72,24 @@ def test_nothing_is_filmed_onto_a_disk_that_is_nearly_full(
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=40_000_000))
     with pytest.raises(StorageFull, match=r"only 40 MB are free .* free some disk space"):
         Filming(tmp_path / "films").start("rendered")
+
+
+def test_ledgers_that_are_left_alone_are_packed(sqlite_settings: Settings) -> None:
+    with Store.open(sqlite_settings) as store:
+        store.gloves.seen("left", META)
+        recording = store.recordings.request("left", name="walk", subject=None, wearing="w")
+        ledger = FrameLog.create(sqlite_settings.recordings_folder / f"{recording.id}.glog", {})
+        for number in range(200):
+            ledger.append(encode_frame(Frame(number, 1, number, number, np.zeros(3, np.float32))))
+        ledger.close()
+        content = ledger.path.read_bytes()
+        assert not sweep(store, sqlite_settings), "it is not over"
+        store.recordings.update(recording.id, state="done")
+        assert not sweep(store, sqlite_settings), "it was written to a moment ago"
+        at = os.stat(ledger.path).st_mtime - 7200
+        os.utime(ledger.path, (at, at))
+        assert "1 ledgers of recordings were packed" in str(sweep(store, sqlite_settings))
+        assert not sweep(store, sqlite_settings)
+        assert ledger.path.stat().st_size < len(content) / 5
+        with open_kept(ledger.path) as file:
+            assert file.read() == content

@@ -1,11 +1,12 @@
 """Files that show or measure a person: encrypted while ``GLOVECAL_ENCRYPTION_KEY_FILE`` names a key.
 
 Whoever reads or writes such a file does it here and need not know which it is: a file that was written
-without a key stays readable when there is one.
+without a key stays readable when there is one, and a frame log may have been packed meanwhile.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
 import secrets
@@ -15,6 +16,7 @@ from io import FileIO
 from pathlib import Path
 from typing import IO, BinaryIO, Literal, cast
 
+from glovecal_client import packed_log
 from glovecal_client.encryption.encrypted_file import (
     GROWING,
     HEADER_BYTES,
@@ -24,6 +26,7 @@ from glovecal_client.encryption.encrypted_file import (
     is_encrypted,
 )
 from glovecal_client.encryption.key_file import key_of_environment
+from glovecal_client.errors import DamagedFile
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_client.private_files import open_private
 
@@ -46,6 +49,19 @@ def is_encrypting() -> bool:
 
 def open_kept(path: Path) -> BinaryIO:
     """Read a file. Raises OSError; of these BadEncryptionKey, and DamagedFile, which reading raises too."""
+    file = _decrypted_file(path)
+    try:
+        begins = file.read(len(packed_log.MAGIC))
+        file.seek(0)
+        if begins != packed_log.MAGIC:
+            return file
+        return cast("BinaryIO", io.BufferedReader(packed_log.PackedReader(file, path.name), 1 << 16))
+    except BaseException:
+        file.close()
+        raise
+
+
+def _decrypted_file(path: Path) -> BinaryIO:
     file = FileIO(path, "rb")
     try:
         key = key_of_environment()
@@ -101,6 +117,9 @@ def resume_growing(path: Path, end: int) -> GrowingFile:
     """Go on after ``end`` bytes of its content. Raises OSError, DamagedFile, BadEncryptionKey."""
     key = key_of_environment()
     file = FileIO(path, "r+b")
+    if is_packed(path):
+        file.close()
+        raise DamagedFile(f"{path.name} is packed: nobody writes to it any more")
     if not is_encrypted(file.read(HEADER_BYTES), key):
         file.seek(end)
         return file
@@ -122,6 +141,8 @@ def cut_file(path: Path, end: int) -> int:
     BadEncryptionKey.
     """
     key = key_of_environment()
+    if is_packed(path):
+        return 0  # what was damaged when it was packed is in it
     with path.open("r+b") as file:
         if is_encrypted(file.read(HEADER_BYTES), key):
             end = DecryptingReader(file, key, path.name, closes=False).boundary(end)
@@ -153,6 +174,51 @@ def encrypt_file(path: Path, *, grows: bool) -> bool:
         unfinished.unlink(missing_ok=True)
         raise
     return True
+
+
+def is_packed(path: Path) -> bool:
+    """Raises OSError, BadEncryptionKey, DamagedFile."""
+    with _decrypted_file(path) as file:
+        return file.read(len(packed_log.MAGIC)) == packed_log.MAGIC
+
+
+def pack_log(path: Path) -> bool:
+    """Put a packed frame log in the place of one that nobody writes to any more, with its times; False for
+    one that is packed already.
+
+    It is read back before; killed at any moment, ``path`` is the one or the other. Raises OSError,
+    BadEncryptionKey, DamagedFile.
+    """
+    if is_packed(path):
+        return False
+    with _decrypted_file(path) as log:
+        about, unfinished = path.stat(), path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
+        try:
+            with create_whole(unfinished) as file:
+                for block in packed_log.packed_blocks(log):
+                    file.write(block)
+                finish_file(file)
+            log.seek(0)
+            if _sha256(log) != _read_back(unfinished):
+                raise DamagedFile(f"{path.name} cannot be packed: it is not read back as it is")
+            os.utime(unfinished, ns=(about.st_atime_ns, about.st_mtime_ns))
+            move_over(unfinished, path, durably=True)
+        except BaseException:
+            unfinished.unlink(missing_ok=True)
+            raise
+    return True
+
+
+def _read_back(path: Path) -> str:
+    with open_kept(path) as file:
+        return _sha256(file)
+
+
+def _sha256(file: BinaryIO) -> str:
+    digest = hashlib.sha256()
+    while part := file.read(1 << 20):
+        digest.update(part)
+    return digest.hexdigest()
 
 
 def _created_as(path: Path, *, grows: bool) -> BinaryIO:
