@@ -13,6 +13,7 @@ import zipfile
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from random import Random
 
 import anyio
 import httpx
@@ -229,7 +230,7 @@ def filled(data: Path) -> dict[Path, bytes]:
     settings = Settings(data=data)
     with Store.open(settings) as store:
         for number in range(20):
-            store.artifacts.put(bytes([number]) * 300_000)
+            store.artifacts.put(Random(number).randbytes(300_000))
     for folder, suffix in (
         ("uploads", ""),
         ("videos", ".zip"),

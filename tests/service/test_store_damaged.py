@@ -1,5 +1,6 @@
 """Full disks and damaged databases: said by name, nothing half written, reading goes on."""
 
+import os
 import sqlite3
 from contextlib import closing, suppress
 from pathlib import Path
@@ -37,12 +38,14 @@ def test_a_full_disk_is_said_and_survived(small_disk):
         store.subjects.create("anna")
         kept = store.takes.add(make_take(0), subject="anna", layout=LAYOUT.name, source="import")
         with pytest.raises(StorageFull, match="no room left in"):
-            store.takes.add(make_take(1, frames=40_000), subject="anna", layout=LAYOUT.name, source="import")
+            store.takes.add(make_take(1, frames=160_000), subject="anna", layout=LAYOUT.name, source="import")
         fill(filler)
         with pytest.raises(StorageFull):
             create_many_subjects(store)
         with pytest.raises(StorageFull):
-            store.models.add(b"x" * 9000, subject="anna", layout="a", method="linear", parent=None, facts={})
+            store.models.add(
+                os.urandom(9000), subject="anna", layout="a", method="linear", parent=None, facts={}
+            )
         assert store.takes.list() == [kept]
         assert len(store.takes.load(kept.id).time_s) == 300
         files = [path.name for path in (small_disk / "data" / "artifacts").iterdir()]

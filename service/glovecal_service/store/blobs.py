@@ -26,6 +26,7 @@ from glovecal_client.errors import DamagedFile
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailable
+from glovecal_service.store.packing import packed, unpacked
 
 TEMPORARY = ".writing-"
 ABANDONED_AFTER_S = 600.0
@@ -205,8 +206,8 @@ SHA256_NAME = re.compile(r"[0-9a-f]{64}\Z")
 
 
 class Artifacts:
-    """Immutable files in a folder or an object store, named by the sha256 of what they hold, encrypted or
-    not."""
+    """Immutable files in a folder or an object store, named by the sha256 of what they hold, packed and
+    encrypted or not."""
 
     def __init__(self, blobs: Blobs) -> None:
         self._blobs = blobs
@@ -220,9 +221,9 @@ class Artifacts:
         """
         name = hashlib.sha256(content).hexdigest()
         kept = self._blobs.read(name)
-        is_sound = kept is not None and self._decrypted(name, kept) == content
-        if not is_sound or (kept == content and is_encrypting()):
-            self._blobs.write(name, encrypted(content))
+        is_sound = kept is not None and self._content(name, kept) == content
+        if not is_sound or (is_encrypting() and unpacked(kept or b"") == content):
+            self._blobs.write(name, encrypted(packed(content)))
         return name
 
     def get(self, sha256: str) -> bytes:
@@ -232,7 +233,7 @@ class Artifacts:
             raise NotFound(
                 f"artifact {sha256} is missing from {self._blobs.place}; restore that file from a backup"
             )
-        content = self._decrypted(sha256, kept)
+        content = self._content(sha256, kept)
         found = hashlib.sha256(content).hexdigest()
         if found != sha256:
             raise DamagedArtifact(
@@ -249,10 +250,10 @@ class Artifacts:
         """What ``get_kept`` gave of another store. Raises StorageFull, StoreUnavailable."""
         self._blobs.write(check_sha256(sha256), kept)
 
-    def _decrypted(self, sha256: str, kept: bytes) -> bytes:
+    def _content(self, sha256: str, kept: bytes) -> bytes:
         """What was changed comes as it lies there, and has another sha256."""
         try:
-            return decrypted(kept, f"artifact {sha256}")
+            return unpacked(decrypted(kept, f"artifact {sha256}"))
         except DamagedFile:
             return kept
 
