@@ -47,7 +47,7 @@ from glovecal_service.realtime.served_model import ServedModel, ServedModels
 OLDEST_NS = 25_000_000
 """A frame that waited longer is skipped; with the budget of a round this keeps a pose younger than 50 ms."""
 ROUND_BUDGET_S = 0.020
-MODEL_WITHIN_NS = 2_000_000_000
+MODEL_WITHIN_NS = 10_000_000_000
 STALE_AFTER_NS = 500_000_000
 STALE_AGAIN_NS = 1_000_000_000
 _COLLECT_EVERY_NS = 10_000_000_000
