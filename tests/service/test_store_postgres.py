@@ -5,11 +5,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
+import psutil
 import pytest
 from jobs_waiting import wait_for
 from postgres_server import PostgresServer, find_programs
 from realtime_support import free_endpoint
+from sqlalchemy import text
 
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.dispatcher import Dispatcher
@@ -95,3 +98,45 @@ def test_serve_waits_for_a_server_that_is_still_starting(own_postgres, tmp_path)
     finally:
         serving.kill()
         serving.communicate()
+
+
+def test_a_server_that_hangs_is_told_at_once_and_a_long_statement_is_waited_for(
+    own_postgres, sqlite_settings
+):
+    settings = sqlite_settings.model_copy(update={"database": own_postgres.new_database()})
+    with Store.open(settings) as store:
+        store.subjects.create("anna")
+        with store.database.read() as connection:
+            assert connection.scalar(text("SELECT 7 FROM pg_sleep(5)")) == 7
+        postmaster = psutil.Process(
+            int((own_postgres.folder / "data" / "postmaster.pid").read_text().split()[0])
+        )
+        processes = [*postmaster.children(recursive=True), postmaster]
+        for each in processes:
+            each.suspend()
+        try:
+            asked = [threading.Thread(target=refused, args=(store,)) for _ in range(4)]
+            for each in asked:
+                each.start()
+            for each in asked:
+                each.join(60)
+                assert not each.is_alive(), "it waits for the server that hangs"
+        finally:
+            for each in processes[::-1]:
+                each.resume()
+        wait_for(lambda: answers(store))
+        assert [each.name for each in store.subjects.list()] == ["anna"]
+
+
+def refused(store: Store) -> None:
+    began = time.monotonic()
+    with pytest.raises(StoreUnavailable):
+        store.subjects.list()
+    print(f"told after {time.monotonic() - began:.1f} s")
+
+
+def answers(store: Store) -> bool:
+    try:
+        return bool(store.subjects.list())
+    except StoreUnavailable:
+        return False

@@ -17,7 +17,7 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from copy import copy
 from datetime import UTC, datetime
 from pathlib import Path
@@ -41,6 +41,7 @@ from glovecal_service.store.actor import OPTION, Actor
 from glovecal_service.store.audit_trail import watch_changes, written_down
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
 from glovecal_service.store.scope import narrow_statements
+from glovecal_service.store.server_watch import ServerWatch
 from glovecal_service.store.texts import json_text
 
 
@@ -55,7 +56,7 @@ def new_id() -> str:
 
 log = logging.getLogger("glovecal.store")
 BUSY_TIMEOUT_MS = 5000
-CONNECTED_WITHIN_S = 5
+CONNECTED_WITHIN_S = 3
 """With a server, in whole seconds; without it a network that swallows packets holds a request for minutes."""
 LEAST_ROOM_BYTES = 1 << 20
 """With less the disk is called full where SQLite speaks of an I/O error: its shared memory grows by 32 kB."""
@@ -82,6 +83,7 @@ class Database:
         """Raises BadInput if the URL is not one of SQLite or PostgreSQL (through psycopg 3)."""
         self.engine = _engine(url)
         self.is_sqlite = self.engine.dialect.name == "sqlite"
+        self._watched = nullcontext if self.is_sqlite else ServerWatch(self.engine).transaction
         narrow_statements(self.engine)
         watch_changes(self.engine)
         self._writing = self.engine.execution_options(glovecal_begin="BEGIN IMMEDIATE")
@@ -108,13 +110,18 @@ class Database:
     @contextmanager
     def read(self) -> Iterator[Connection]:
         """A transaction that sees one state of the database and changes nothing."""
-        with self._translated(), self.engine.begin() as connection:
+        with self._translated(), self._watched(), self.engine.begin() as connection:
             yield connection
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
         """A transaction that is kept whole or not at all."""
-        with self._translated(), self._writing.begin() as connection, written_down(connection):
+        with (
+            self._translated(),
+            self._watched(),
+            self._writing.begin() as connection,
+            written_down(connection),
+        ):
             yield connection
 
     def close(self) -> None:
