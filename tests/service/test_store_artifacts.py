@@ -2,14 +2,16 @@
 
 import hashlib
 import os
+import socket
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput, DamagedArtifact
+from glovecal_service.store import blobs
 from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, Artifacts, FolderBlobs, ObjectBlobs
-from glovecal_service.store.errors import NotFound
+from glovecal_service.store.errors import NotFound, StoreUnavailable
 
 
 @pytest.fixture(params=["folder", "object store"])
@@ -17,7 +19,7 @@ def artifacts(request, tmp_path):
     """The folder we write ourselves, and the same through obstore (its own folder store and URL)."""
     if request.param == "folder":
         return Artifacts(FolderBlobs(tmp_path))
-    return Artifacts(ObjectBlobs(tmp_path.as_uri()))
+    return Artifacts(ObjectBlobs(tmp_path.as_uri(), tmp_path / "cache"))
 
 
 def test_what_is_read_is_what_was_written(artifacts):
@@ -124,6 +126,42 @@ def test_leftovers_of_killed_writers_are_swept(tmp_path):
     assert fresh.exists(), "another process may be writing it"
 
 
-def test_an_unusable_object_store_is_named():
+def test_an_unusable_object_store_is_named(tmp_path):
     with pytest.raises(BadInput, match="GLOVECAL_ARTIFACTS"):
-        ObjectBlobs("gopher://nowhere")
+        ObjectBlobs("gopher://nowhere", tmp_path)
+
+
+def test_an_object_store_that_hangs_is_told_and_what_was_read_before_is_read_again(tmp_path, monkeypatch):
+    """Something that accepts and never answers stands for it."""
+    monkeypatch.setattr(blobs, "READ_WITHIN_S", 1)
+    monkeypatch.setattr(blobs, "WRITTEN_WITHIN_S", 1)
+    (tmp_path / "objects").mkdir()
+    before = Artifacts(ObjectBlobs((tmp_path / "objects").as_uri(), tmp_path / "cache"))
+    name = before.put(b"a model")
+    with socket.create_server(("127.0.0.1", 0)) as hanging:
+        for variable, value in (
+            ("AWS_ENDPOINT_URL", f"http://127.0.0.1:{hanging.getsockname()[1]}"),
+            ("AWS_ALLOW_HTTP", "true"), ("AWS_ACCESS_KEY_ID", "a"), ("AWS_SECRET_ACCESS_KEY", "b"),
+            ("AWS_REGION", "here"),
+        ):  # fmt: skip
+            monkeypatch.setenv(variable, value)
+        artifacts = Artifacts(ObjectBlobs("s3://bucket", tmp_path / "cache"))
+        assert artifacts.get(name) == b"a model"
+        for act in (
+            lambda: artifacts.get("0" * 64), lambda: artifacts.put(b"another"),
+            lambda: artifacts.exists(name), lambda: artifacts.verify(name),
+        ):  # fmt: skip
+            with pytest.raises(StoreUnavailable, match="the object store s3://bucket does not answer"):
+                act()
+
+
+def test_the_oldest_make_room_in_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(blobs, "CACHE_BYTES", 250_000)
+    (tmp_path / "objects").mkdir()
+    artifacts = Artifacts(ObjectBlobs((tmp_path / "objects").as_uri(), tmp_path / "cache"))
+    names = [artifacts.put(os.urandom(100_000)) for _ in range(4)]
+    for age, name in enumerate(names):
+        assert artifacts.get(name), age
+    assert {path.name for path in (tmp_path / "cache").iterdir()} == set(names[2:])
+    artifacts.remove(names[3])
+    assert {path.name for path in (tmp_path / "cache").iterdir()} == {names[2]}

@@ -42,7 +42,7 @@ FORMAT = "glovecal.backup.v1"
 DATABASE, MANIFEST = "database.sqlite3", "manifest.json"
 ARTIFACTS, FILES = "artifacts/", "files/"
 _OF_A_PROCESS = (LOCK, WHO, "realtime.alive", "realtime.restarts")
-_OF_ONE_RUN = ("artifacts", "fits", "owners")
+_OF_ONE_RUN = ("artifacts", "artifacts-cache", "fits", "owners")
 """Folders: artifacts come as the database names them, the others are of jobs that begin anew."""
 _UNFINISHED = (".writing-", ".unfinished", ".encrypting")
 _ROWS_AT_ONCE = 500

@@ -69,7 +69,9 @@ class Store:
         database = Database(settings.database_url)
         close_to_others(settings.data.resolve(), database.files)
         blobs = (
-            ObjectBlobs(settings.artifacts) if settings.artifacts else FolderBlobs(settings.artifacts_folder)
+            ObjectBlobs(settings.artifacts, settings.data / "artifacts-cache")
+            if settings.artifacts
+            else FolderBlobs(settings.artifacts_folder)
         )
         try:
             upgrade(database)
@@ -107,7 +109,18 @@ class Store:
 
 
 FOLDERS = frozenset(
-    {"artifacts", "cameras", "capture", "films", "fits", "owners", "recordings", "uploads", "videos"}
+    {
+        "artifacts",
+        "artifacts-cache",
+        "cameras",
+        "capture",
+        "films",
+        "fits",
+        "owners",
+        "recordings",
+        "uploads",
+        "videos",
+    }
 )
 _log = logging.getLogger("glovecal.store")
 
