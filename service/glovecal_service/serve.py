@@ -213,16 +213,16 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
 
 def _store_that_answers(settings: Settings) -> Store:
     """Waits for a database server that is still starting. Raises as ``Store.open`` does."""
-    until, told = time.monotonic() + DATABASE_WITHIN_S, False
+    until, is_logged = time.monotonic() + DATABASE_WITHIN_S, False
     while True:
         try:
             return Store.open(settings)
         except StoreUnavailable as error:
             if settings.database is None or time.monotonic() > until:
                 raise
-            if not told:
+            if not is_logged:
                 _log.warning("waiting %.0f s for the database: %s", DATABASE_WITHIN_S, error)
-            told = True
+            is_logged = True
             time.sleep(0.5)
 
 

@@ -132,10 +132,10 @@ def restore_backup(source: Path, settings: Settings) -> Backup:
 # Writing it.
 
 
-def _write(store: Store, settings: Settings, file: IO[bytes], beside: Path) -> None:
+def _write(store: Store, settings: Settings, file: IO[bytes], folder: Path) -> None:
     written_at, written = datetime.now(UTC), list[dict[str, Any]]()
     with tarfile.open(fileobj=file, mode="w", format=tarfile.PAX_FORMAT) as archive:
-        with tempfile.TemporaryDirectory(prefix=".glovecal-backup-", dir=beside) as place:
+        with tempfile.TemporaryDirectory(prefix=".glovecal-backup-", dir=folder) as place:
             copy = Path(place) / DATABASE
             _copy_database(store.database, copy)
             written.append(_add_file(archive, DATABASE, copy))
@@ -233,8 +233,8 @@ def _fill_server(source: Path, settings: Settings) -> None:
         copy.close()
         database.close()
     source.unlink()
-    for beside in source.parent.glob(f"{source.name}-*"):
-        beside.unlink()
+    for file in source.parent.glob(f"{source.name}-*"):
+        file.unlink()
 
 
 def _copy_rows(connection: Connection, to: Connection) -> None:
@@ -270,16 +270,16 @@ def _unpack(source: Path, folder: Path) -> dict[str, Any]:
     try:
         with tarfile.open(source, "r:") as archive:
             manifest = _manifest(archive)
-            told = {each["name"]: each for each in manifest["files"]}
+            listed = {each["name"]: each for each in manifest["files"]}
             for entry in archive:
                 if entry.name != MANIFEST:
-                    _unpack_one(archive, entry, told.pop(entry.name, None), folder)
+                    _unpack_one(archive, entry, listed.pop(entry.name, None), folder)
     except BadInput as error:
         raise BadInput(f"{source} is damaged or no backup of Glovecal: {error}") from error
     except (tarfile.TarError, KeyError, TypeError, ValueError, EOFError) as error:
         raise BadInput(f"{source} is damaged or no backup of Glovecal: its list cannot be read") from error
-    if told:
-        raise BadInput(f"{source} is damaged: {len(told)} files are missing, such as {next(iter(told))}")
+    if listed:
+        raise BadInput(f"{source} is damaged: {len(listed)} files are missing, such as {next(iter(listed))}")
     return manifest
 
 
@@ -295,10 +295,10 @@ def _manifest(archive: tarfile.TarFile) -> dict[str, Any]:
 
 
 def _unpack_one(
-    archive: tarfile.TarFile, entry: tarfile.TarInfo, told: dict[str, Any] | None, folder: Path
+    archive: tarfile.TarFile, entry: tarfile.TarInfo, listed: dict[str, Any] | None, folder: Path
 ) -> None:
     content = archive.extractfile(entry) if entry.isreg() else None
-    if told is None or content is None:
+    if listed is None or content is None:
         raise BadInput(f"{entry.name!r} is not in its manifest")
     place = _place(folder, entry.name)
     place.parent.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
@@ -307,7 +307,7 @@ def _unpack_one(
         while part := content.read(1 << 20):
             digest.update(part)
             file.write(part)
-    if digest.hexdigest() != told["sha256"]:
+    if digest.hexdigest() != listed["sha256"]:
         raise BadInput(f"{entry.name} was changed after it was written")
 
 
@@ -339,11 +339,11 @@ def _look_through(store: Store) -> tuple[dict[str, int], set[str], tuple[str, ..
     for table in metadata.sorted_tables:
         try:
             with store.database.read() as connection:
-                found = sound_rows(connection, table, select(table), lambda values: None)
+                records = sound_rows(connection, table, select(table), lambda values: None)
         except DamagedRows as error:
             problems += error.damaged
-            found = error.sound
-        rows[table.name] = len(found)
+            records = error.sound
+        rows[table.name] = len(records)
     named = _artifacts_named(store.database)
     for name in sorted(named):
         try:

@@ -177,9 +177,9 @@ def _engine(url: str | URL) -> Engine:
             parsed = parsed.set(drivername="postgresql+psycopg")
         if parsed.drivername not in ("sqlite", "sqlite+pysqlite", "postgresql+psycopg"):
             raise ArgumentError(f"driver {parsed.drivername!r} is not supported")
-        patience = {} if parsed.get_backend_name() == "sqlite" else {"connect_timeout": CONNECTED_WITHIN_S}
+        options = {} if parsed.get_backend_name() == "sqlite" else {"connect_timeout": CONNECTED_WITHIN_S}
         engine = create_engine(
-            parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40, connect_args=patience
+            parsed, pool_pre_ping=True, json_serializer=json_text, max_overflow=40, connect_args=options
         )
     except ModuleNotFoundError as error:
         raise BadInput(not_installed("GLOVECAL_DATABASE with PostgreSQL", "psycopg[binary]")) from error
