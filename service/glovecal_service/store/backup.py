@@ -32,7 +32,6 @@ from glovecal_service.store.blobs import SHA256_NAME, full_disk_named
 from glovecal_service.store.data_folder_lock import LOCK, WHO
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import DamagedRows, NotFound
-from glovecal_service.store.migrate import backup as copy_sqlite
 from glovecal_service.store.row_hash import sound_rows
 from glovecal_service.store.schema import upgrade
 from glovecal_service.store.store import Store
@@ -201,7 +200,9 @@ class _Hashing(io.RawIOBase):
 
 def _copy_database(database: Database, target: Path) -> None:
     if database.file is not None:
-        copy_sqlite(database.file, target)
+        from glovecal_service.store.migrate import backup  # which brings Alembic
+
+        backup(database.file, target)
         return
     with _opened_copy(target) as copy, copy.engine.begin() as to, database.engine.connect() as connection:
         snapshot = connection.execution_options(isolation_level="REPEATABLE READ")
