@@ -63,13 +63,6 @@ class Settings(BaseSettings):
     """Training processes, one thread each."""
     workers_idle_s: Annotated[float, Field(gt=0, le=86400)] = 60.0
     """Training processes that nobody has needed for so long are ended; the next job starts them anew."""
-    scheduler_ca: Path | None = None
-    scheduler_certificate: Path | None = None
-    scheduler_key: Path | None = None
-    """PEM files with which ``scheduler`` and this service prove to each other who they are."""
-    scheduler: str | None = None
-    """Address ``tls://HOST:PORT`` of a Dask scheduler whose workers share ``data``; None: workers of our own,
-    started when they are needed."""
     oidc_client_id: str = ""
     oidc_secret_file: Path | None = None
     """File with the secret that the provider gave this service; None: it gave none (a public client)."""
@@ -114,21 +107,6 @@ class Settings(BaseSettings):
             if not _ENDPOINT.match(each):
                 raise ValueError(f"{each!r} is no endpoint of a router, such as tls/lab-2.example:7447")
         return peers
-
-    @field_validator("scheduler")
-    @classmethod
-    def _scheduler_is_protected(cls, scheduler: str | None, info: ValidationInfo) -> str | None:
-        """Whoever reaches a scheduler without TLS runs code on all its workers, and through them here."""
-        if scheduler is None:
-            return None
-        if not scheduler.startswith("tls://"):
-            raise ValueError("a scheduler is reached over TLS only: tls://HOST:PORT")
-        for name in ("scheduler_ca", "scheduler_certificate", "scheduler_key"):
-            file = info.data.get(name)
-            if file is None or not file.is_file():
-                problem = "is not set" if file is None else f"is {str(file)!r}, which is no file"
-                raise ValueError(f"it needs a PEM file in GLOVECAL_{name.upper()}, but that {problem}")
-        return scheduler
 
     @field_validator("oidc_secret_file")
     @classmethod

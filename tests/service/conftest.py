@@ -50,7 +50,7 @@ def postgres(not_here: Callable[[str], NoReturn]) -> Iterator[PostgresServer]:
 
 @pytest.fixture
 def sqlite_settings(tmp_path: Path) -> Settings:
-    return Settings(data=tmp_path / "data", database=None, artifacts=None, scheduler=None, workers=2)
+    return Settings(data=tmp_path / "data", database=None, artifacts=None, workers=2)
 
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.needs_postgres)])

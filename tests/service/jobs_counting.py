@@ -42,6 +42,8 @@ def count(work: Counting, cancelled: Callable[[], bool], report: TaskReport) -> 
         raise NotTrainable("the samples are all alike")
     if work.ending == "break":
         raise ZeroDivisionError("a mistake in the program")
+    if work.ending == "network":
+        raise ConnectionResetError(104, "Connection reset by peer")
     if work.ending == "die":
         os.kill(os.getpid(), signal.SIGKILL)
     note(work.ledger, f"done {work.number} {os.getpid()}")

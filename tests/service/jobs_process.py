@@ -30,4 +30,4 @@ if __name__ == "__main__":
 
         os.environ["PYTHONPATH"] = of_children[0]
         sys.path.insert(0, of_children[0])  # newer Pythons hand this to children instead
-    run_jobs(Settings(data=Path(data), database=database or None, artifacts=None, scheduler=None, workers=1))
+    run_jobs(Settings(data=Path(data), database=database or None, artifacts=None, workers=1))

@@ -7,12 +7,14 @@ import sys
 from pathlib import Path
 
 import jobs_process
+import psutil
 import pytest
 from jobs_counting import CountingJob, noted
 from jobs_waiting import error_of, result_of, wait_for, wait_for_job
 
 from glovecal_service.jobs import job_run, workers
 from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.jobs.job_kind import TaskResult
 from glovecal_service.jobs.owner import Owner
 from glovecal_service.questions.catalogue import ANSWERED
 
@@ -152,7 +154,6 @@ def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_setting
     assert noted(ledger, "done")[: len(done)] == done
     assert sorted(noted(ledger, "done")) == [1, 2, 3]
     assert not list((sqlite_settings.data / "owners").iterdir())
-    assert not list(sqlite_settings.fits_folder.glob("cancel-*"))
 
 
 def test_a_predecessor_that_lives_keeps_its_jobs(sqlite_store, sqlite_settings):
@@ -207,40 +208,41 @@ def test_a_job_goes_on_through_any_number_of_losses_between_which_it_gets_on(dis
     assert losses > job_run.WORKER_RESTARTS
 
 
-def test_an_answer_that_comes_too_late_is_not_missed(dispatched, ledger, monkeypatch):
-    """The result is on disk, so nobody has to wait for the word that it is, nor to fit again."""
+def test_what_was_told_counts_although_the_process_went_right_after(dispatched, sqlite_store, ledger):
+    """The result has come by itself: nobody has to fetch it from a process that may be gone."""
+    _, dispatcher = dispatched
+    [task] = CountingJob().plan(sqlite_store, create(sqlite_store, ledger, [2])).tasks
+    handed = dispatcher.workers.submit(task, lambda *_: None)
+    wait_for(lambda: handed.is_over)
+    dispatcher.workers.reset()
+    assert TaskResult.from_bytes(handed.outcome.result).arrays["sum"] == 3
+
+
+def test_another_job_may_replace_the_processes_in_the_middle(dispatched, sqlite_store, ledger):
+    _, dispatcher = dispatched
+    [task] = CountingJob().plan(sqlite_store, create(sqlite_store, ledger, [2], seconds=600)).tasks
+    handed = dispatcher.workers.submit(task, lambda *_: None)
+    wait_for(lambda: noted(ledger, "begin"))
+    dispatcher.workers.reset()
+    wait_for(lambda: handed.is_over)
+    with pytest.raises(workers.WorkersLost):
+        _ = handed.outcome
+
+
+def test_an_error_of_a_task_is_not_taken_for_a_lost_worker(dispatched, ledger):
+    """Also one that says what the system says of a broken connection; nothing is tried again."""
     store, dispatcher = dispatched
     client = dispatcher.workers._started()
-    monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1e-6)
-    assert result_of(store, create(store, ledger, [1, 2, 3, 4, 5, 6]).id)["sums"] == [1, 3, 6, 10, 15, 21]
-    assert sorted(noted(ledger, "done")) == [1, 2, 3, 4, 5, 6]
+    job = wait_for_job(store, create(store, ledger, [2], ending="network").id)
+    assert job.error == "an error in Glovecal itself (ConnectionResetError): the job's traceback tells where"
+    assert noted(ledger, "begin") == [2]
     assert dispatcher.workers._client is client
 
 
-def test_a_result_that_went_with_its_process_is_not_waited_for_for_ever(
-    dispatched, ledger, monkeypatch, tmp_path
-):
-    """It was announced, and then the process that held it ended."""
+def test_a_worker_touches_nothing_of_the_data_folder(dispatched, ledger):
+    """What it found is kept by this process alone."""
     store, dispatcher = dispatched
-    monkeypatch.setattr(workers, "FETCH_WITHIN_S", 1.0)
-    [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
-    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel", tmp_path / "progress")
-    wait_for(future.done)
-    cluster = dispatcher.workers._cluster
-    cluster.scale(0)
-    wait_for(lambda: not cluster.scheduler.workers)
-    with pytest.raises(workers.WorkersLost):
-        workers.outcome(future, task)
-    dispatcher.workers.reset()  # or the next job would wait for LONGEST_ABSENCE_S
-
-
-def test_another_job_may_replace_the_processes_between_announcement_and_fetching(
-    dispatched, ledger, tmp_path
-):
-    store, dispatcher = dispatched
-    [task] = CountingJob().plan(store, create(store, ledger, [2])).tasks
-    future = dispatcher.workers.submit(task, tmp_path / "fits", tmp_path / "cancel", tmp_path / "progress")
-    wait_for(future.done)
-    dispatcher.workers.reset(future.client)
-    with pytest.raises(workers.WorkersLost):
-        workers.outcome(future, task)
+    [facts] = result_of(store, create(store, ledger, [6]).id)["facts"]
+    files = [Path(item.path) for item in psutil.Process(facts["pid"]).open_files()]
+    folder = dispatcher._folder.parent.resolve()
+    assert [file for file in files if file.is_relative_to(folder) and "workers" not in file.parts] == []

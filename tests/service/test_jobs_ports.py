@@ -8,15 +8,12 @@ from pathlib import Path
 import distributed
 import psutil
 import pytest
-from distributed import LocalCluster, Security
+from distributed import LocalCluster
 from jobs_counting import CountingJob
 from jobs_waiting import result_of, wait_for
 from port_attack import NOBODY, attack
 
-from glovecal_models.errors import BadInput
-from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.jobs.dispatcher import Dispatcher
-from glovecal_service.settings import Settings
 
 
 def listening() -> set[int]:
@@ -74,47 +71,3 @@ def test_the_ports_close_when_nobody_needs_them(sqlite_store, sqlite_settings, t
             result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [number]))
             wait_for(lambda: not dispatcher.workers.started)
             wait_for(lambda: listening() <= before)
-
-
-@pytest.fixture
-def certificates(tmp_path):
-    """PEM files as an operator would keep them, and what Dask makes of them."""
-    made = Security.temporary()
-    texts = {"ca": made.tls_ca_file, "certificate": made.tls_client_cert, "key": made.tls_client_key}
-    for name, text in texts.items():
-        (tmp_path / f"{name}.pem").write_text(text)
-    return {f"scheduler_{name}": tmp_path / f"{name}.pem" for name in texts}, made
-
-
-def test_a_scheduler_elsewhere_is_reached_with_the_configured_certificate(
-    sqlite_store, sqlite_settings, tmp_path, certificates
-):
-    files, security = certificates
-    elsewhere = LocalCluster(n_workers=1, processes=False, security=security, dashboard_address="127.0.0.1:0")
-    try:
-        given = {**sqlite_settings.model_dump(), **files, "scheduler": elsewhere.scheduler_address}
-        with Dispatcher(sqlite_store, Settings(**given), {"count": CountingJob()}) as dispatcher:
-            assert result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [4]))["sums"] == [10]
-            assert dispatcher.workers.address == elsewhere.scheduler_address
-    finally:
-        elsewhere.close()
-
-
-@pytest.mark.parametrize(
-    ("address", "left_out", "sentence"),
-    [
-        ("tcp://10.0.0.7:8786", "", r"GLOVECAL_SCHEDULER is 'tcp://10.0.0.7:8786': .* over TLS only: tls://"),
-        ("tls://10.0.0.7:8786", "scheduler_key", "a PEM file in GLOVECAL_SCHEDULER_KEY, but that is not set"),
-        ("tls://10.0.0.7:8786", "file", "in GLOVECAL_SCHEDULER_CA, but that is '.*ca.pem', which is no file"),
-    ],
-)
-def test_a_scheduler_without_a_proof_is_refused(monkeypatch, certificates, address, left_out, sentence):
-    files, _ = certificates
-    for name, file in files.items():
-        if name != left_out:
-            monkeypatch.setenv(f"GLOVECAL_{name.upper()}", str(file))
-    if left_out == "file":
-        files["scheduler_ca"].unlink()
-    monkeypatch.setenv("GLOVECAL_SCHEDULER", address)
-    with pytest.raises(BadInput, match=sentence):
-        settings_of_environment()

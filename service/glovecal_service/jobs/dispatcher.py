@@ -37,7 +37,7 @@ class Dispatcher:
         """``of_one_command``: this process has nothing to do but wait for a job, so that it runs a job's only
         task itself and starts no workers for it."""
         self.workers = Workers(settings)
-        self._runs_single_tasks = of_one_command and settings.scheduler is None
+        self._runs_single_tasks = of_one_command
         self._store = store
         self._folder = settings.fits_folder
         self._owners = settings.data / "owners"

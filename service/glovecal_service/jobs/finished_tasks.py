@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 from contextlib import suppress
 from pathlib import Path
 
 from safetensors import SafetensorError
-from safetensors.numpy import load as load_arrays
-from safetensors.numpy import save as save_arrays
 
 from glovecal_client.encryption.kept_file import encrypted, read_kept
 from glovecal_client.operating_system import remove
@@ -36,13 +33,13 @@ class FinishedTasks:
                 content = read_kept(path)
                 if hashlib.sha256(content).hexdigest() == path.name.split(".")[1]:
                     os.utime(path)
-                    return _load(content)
+                    return TaskResult.from_bytes(content)
             remove(path)
         return None
 
     def put(self, key: str, result: TaskResult) -> None:
         """Keep a result. Raises StorageFull."""
-        content = save_arrays(result.arrays, {"facts": json.dumps(result.facts, allow_nan=False)})
+        content = result.to_bytes()
         digest = hashlib.sha256(content).hexdigest()
         write_durably(self.folder / f"{_check(key)}.{digest}.safetensors", encrypted(content))
 
@@ -63,8 +60,3 @@ def _check(key: str) -> str:
     if not _KEY.match(key):
         raise BadInput(f"{key!r} is no task key: 16 to 128 hexadecimal digits")
     return key
-
-
-def _load(content: bytes) -> TaskResult:
-    header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
-    return TaskResult(load_arrays(content), json.loads(header["__metadata__"]["facts"]))

@@ -5,11 +5,14 @@ A new kind is one module with a ``JobKind`` and one line in ``questions/catalogu
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from safetensors.numpy import load as load_arrays
+from safetensors.numpy import save as save_arrays
 
 from glovecal_models.progress import Cancel
 
@@ -20,11 +23,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """What a task computed, in the form a file can hold."""
+    """What a task computed, in the form in which it travels and a file can hold it."""
 
     arrays: dict[str, np.ndarray]
     facts: dict[str, Any]
     """JSON-able."""
+
+    def to_bytes(self) -> bytes:
+        """As safetensors, in which there is nothing to run."""
+        return save_arrays(self.arrays, {"facts": json.dumps(self.facts, allow_nan=False)})
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> TaskResult:
+        """Raises SafetensorError, KeyError or ValueError where ``to_bytes`` did not make it."""
+        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+        return cls(load_arrays(content), json.loads(header["__metadata__"]["facts"]))
 
 
 class TaskReport(Protocol):

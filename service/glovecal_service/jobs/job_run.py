@@ -6,36 +6,51 @@ import logging
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import Any
 
-from glovecal_client.operating_system import remove
 from glovecal_models.errors import Cancelled, GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
-from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskResult
-from glovecal_service.jobs.progress_file import ProgressFile, TaskProgress
-from glovecal_service.jobs.task_run import TaskOutcome, run_task
+from glovecal_service.jobs.job_kind import JobKind, JobPlan, Task, TaskReport, TaskResult
+from glovecal_service.jobs.task_run import TaskOutcome, mistake, run_task
 from glovecal_service.jobs.time_left import TimeLeft
-from glovecal_service.jobs.workers import Workers, WorkersLost, finished, outcome
+from glovecal_service.jobs.workers import HandedOut, Workers, WorkersLost, finished
 from glovecal_service.logs import Word
 from glovecal_service.operating_system import step_back_in_this_thread
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict, StoreUnavailable
 from glovecal_service.store.records import JobRecord
 
-if TYPE_CHECKING:
-    from distributed import Future
-
 _log = logging.getLogger("glovecal.jobs")
 
 WATCH_S = 0.2
 HEARTBEAT_S = 5.0
-STRAGGLERS_S = 1.0
-"""After a cancel the row is written this late at most, whether or not the last fit has noticed."""
+MOST_BYTES_OUT = 256_000_000
+"""Of one job's tasks with workers or on their way: this process has them in memory until they are done."""
 WORKER_RESTARTS = 3
 """In a row: a job that gets on between two losses, as a long one on a busy computer does, may go on."""
 RETRY_WRITES_FOR_S = 60.0
+
+
+@dataclass(frozen=True)
+class TaskProgress:
+    """What a running task said last."""
+
+    sentence: str
+    share: float
+    """Of this task, 0 to 1."""
+    detail: Mapping[str, Any]
+
+
+class TaskFailed(GlovecalError):
+    """What a task's outcome says, with the traceback of an error that nobody foresaw."""
+
+    def __init__(self, sentence: str, trace: str | None) -> None:
+        super().__init__(sentence)
+        self.trace = trace
 
 
 class JobRun:
@@ -58,12 +73,12 @@ class JobRun:
         self._kind = kind
         self._workers = workers
         self._finished = FinishedTasks(folder)
-        self._cancel_file = folder / f"cancel-{job.id}-{job.attempt}"
-        self._folder = folder
         self._telling = threading.Lock()
         self._tasks: Sequence[Task] = ()
         self._done: set[int] = set()
-        self._heard: dict[int, TaskProgress] = {}
+        self._reported: dict[int, TaskProgress] = {}
+        """Written by whoever runs a task."""
+        self._noticed: dict[int, TaskProgress] = {}
         self._time_left: TimeLeft | None = None
         self._ended = threading.Event()
         self._stopped = threading.Event()
@@ -87,9 +102,6 @@ class JobRun:
         finally:
             self._ended.set()
             watch.join()
-            remove(self._cancel_file)
-            for number in range(len(self._tasks)):
-                remove(self._progress_file(number))
 
     def _end(self) -> Callable[[], object]:
         """Do the work; the write that ends it."""
@@ -106,12 +118,14 @@ class JobRun:
             if self._is_over():
                 raise
             message = str(error)
+        except TaskFailed as error:
+            message, trace = str(error), error.trace
         except GlovecalError as error:
             message = str(error)
         except Exception as error:
-            trace = traceback.format_exc()
-            _log.exception("job %s (%s) failed", id, Word(self._job.kind))
-            message = f"an error in Glovecal itself ({type(error).__name__}): the job's traceback tells where"
+            message, trace = mistake(error), traceback.format_exc()
+        if trace is not None:
+            _log.error("job %s (%s) failed: %s", id, Word(self._job.kind), trace)
         return lambda: jobs.fail(id, attempt, message, trace)
 
     def _result(self) -> dict:
@@ -150,10 +164,13 @@ class JobRun:
 
     def _run_here(self, number: int, task: Task) -> TaskOutcome:
         self._begin_to_count()
-        return run_task(task, self._finished.folder, self._cancel_file, self._progress_file(number))
+        return run_task(task, self._stopped.is_set, self._report(number))
 
-    def _progress_file(self, number: int) -> Path:
-        return self._folder / f"progress-{self._job.id}-{self._job.attempt}-{number}.json"
+    def _report(self, number: int) -> TaskReport:
+        def report(sentence: str, share: float, detail: Mapping[str, Any] = MappingProxyType({}), /) -> None:
+            self._reported[number] = TaskProgress(sentence, min(max(float(share), 0.0), 1.0), detail)
+
+        return report
 
     def _fit_in_workers(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
         restarts = 0
@@ -171,69 +188,47 @@ class JobRun:
                 self._workers.reset(error.client)
 
     def _hand_out(self, plan: JobPlan, results: dict[int, TaskResult]) -> None:
-        """Keep every worker busy with one task and one waiting; futures are dropped as they finish."""
+        """Keep every worker busy with one task and one waiting."""
         waiting = [number for number in range(len(plan.tasks)) if number not in results]
-        running: dict[Future, int] = {}
+        running: dict[HandedOut, int] = {}
         if waiting and not self._workers.started:
             self._progress(self._fraction(), "starting the training processes", {})
         try:
             while waiting or running:
                 self._raise_if_stopped()
-                while waiting and len(running) < 2 * self._workers.count:
+                while waiting and self._may_hand_out(running):
                     number = waiting.pop(0)
-                    task = plan.tasks[number]
-                    files = self._finished.folder, self._cancel_file, self._progress_file(number)
-                    future = self._workers.submit(task, *files)
-                    running[future] = number
+                    running[self._workers.submit(plan.tasks[number], self._report(number))] = number
                     self._begin_to_count()
                 self._workers.check()
-                for future in finished(list(running), WATCH_S):
-                    number = running.pop(future)
-                    self._take(plan, number, self._outcome(future, plan.tasks[number]), results)
-        except WorkersLost:
-            raise
-        except BaseException:
-            self._leave(list(running))
-            raise
+                for handed in finished(list(running), WATCH_S):
+                    self._take(plan, running.pop(handed), handed.outcome, results)
+        finally:
+            for handed in running:
+                handed.drop()
 
-    def _outcome(self, future: Future, task: Task) -> TaskOutcome:
-        """Of a finished future. An answer that is lost, or late on a busy computer, is not missed where the
-        task's result is on disk. Raises as ``outcome``.
-        """
-        try:
-            return outcome(future, task)
-        except WorkersLost:
-            if self._finished.get(task.key) is None:
-                raise
-            return TaskOutcome(task.key, 0.0)
-
-    def _leave(self, running: list[Future]) -> None:
-        """An error or a cancel: the fits in flight are told to stop, and given a moment to do so."""
-        self._cancel()
-        until = time.monotonic() + STRAGGLERS_S
-        while running and (left := until - time.monotonic()) > 0:
-            done = finished(running, left)
-            running = [future for future in running if future not in done]
+    def _may_hand_out(self, running: Collection[HandedOut]) -> bool:
+        if len(running) >= 2 * self._workers.count:
+            return False
+        return not running or sum(handed.weight for handed in running) < MOST_BYTES_OUT
 
     def _take(self, plan: JobPlan, number: int, outcome: TaskOutcome, results: dict[int, TaskResult]) -> None:
         if outcome.cancelled:
             raise Cancelled("the fit was stopped")
         if outcome.error is not None:
-            raise GlovecalError(outcome.error)
-        result = self._finished.get(outcome.key)
-        if result is None:
-            raise WorkersLost(f"the result of {plan.tasks[number].label} is not in {self._finished.folder}")
-        results[number] = result
+            raise TaskFailed(outcome.error, outcome.trace)
+        results[number] = TaskResult.from_bytes(outcome.result)
+        self._finished.put(plan.tasks[number].key, results[number])
         step = plan.step(number, results)
         with self._telling:
             self._done.add(number)
-            self._heard.pop(number, None)
+            self._noticed.pop(number, None)
         self._progress(self._fraction(), step.sentence, step.detail)
 
     def _fraction(self) -> float:
         """Of all tasks' efforts, what is done and what running tasks have said of themselves."""
         effort = [1.0 if task.effort is None else task.effort for task in self._tasks]
-        running = sum(effort[number] * said.share for number, said in self._heard.items())
+        running = sum(effort[number] * progress.share for number, progress in self._noticed.items())
         return (sum(effort[number] for number in self._done) + running) / max(sum(effort), 1e-9)
 
     def _begin_to_count(self) -> None:
@@ -252,15 +247,14 @@ class JobRun:
         self._store.jobs.progress(self._job.id, self._job.attempt, fraction, sentence, detail)
 
     def _tell_on(self) -> None:
-        """Pass on what a running task said last, once; its file is gone before its own end is told."""
+        """Pass on what a running task said last, once."""
         with self._telling:
             told = None
-            for number in set(range(len(self._tasks))) - self._done:
-                said = ProgressFile(self._progress_file(number)).read()
-                if said is not None and said != self._heard.get(number):
-                    self._heard[number] = told = said
+            for number, progress in list(self._reported.items()):
+                if number not in self._done and progress != self._noticed.get(number):
+                    self._noticed[number] = told = progress
             if told is not None and not self._stopped.is_set():
-                self._tell(self._fraction(), told.sentence, told.detail)
+                self._tell(self._fraction(), told.sentence, dict(told.detail))
 
     def _written(self, write: Callable[[], object]) -> None:
         """Repeat a write while the database is away; the lease outlives a short restart."""
@@ -295,8 +289,6 @@ class JobRun:
 
     def _cancel(self) -> None:
         self._stopped.set()
-        if not self._ended.is_set():
-            self._cancel_file.touch()
 
     def _raise_if_stopped(self) -> None:
         if self._stopped.is_set():

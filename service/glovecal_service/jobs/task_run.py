@@ -1,65 +1,46 @@
-"""Runs one task, in a worker process or in this one, and keeps its result on disk."""
+"""Runs one task, in a worker process or in this one: what it needs comes with it, what it found goes back."""
 
 from __future__ import annotations
 
-import time
+import traceback
 from dataclasses import dataclass
-from pathlib import Path
 
-from glovecal_client.encryption.key_file import settle_encryption
-from glovecal_client.errors import BadEncryptionKey
 from glovecal_models.errors import Cancelled, GlovecalError
-from glovecal_service.jobs.finished_tasks import FinishedTasks
-from glovecal_service.jobs.job_kind import Task
-from glovecal_service.jobs.progress_file import ProgressFile
-
-CANCEL_POLL_S = 0.05
+from glovecal_models.progress import Cancel
+from glovecal_service.jobs.job_kind import Task, TaskReport
 
 
 @dataclass(frozen=True)
 class TaskOutcome:
-    """The little that travels back; the result itself is on disk."""
+    """What became of a task."""
 
-    key: str
-    seconds: float
+    result: bytes = b""
+    """As ``TaskResult.to_bytes`` has it, where there is neither an error nor a cancel."""
     error: str | None = None
+    """For a person."""
+    trace: str | None = None
+    """Of an error that nobody foresaw."""
     cancelled: bool = False
 
 
-def run_task(task: Task, folder: Path, cancel_file: Path, progress_file: Path) -> TaskOutcome:
-    """Run ``task`` unless its result is there. Once this returns without error, the result is on disk.
-
-    Stops soon after ``cancel_file`` appears; what the task reports is in ``progress_file`` until it ends.
-    """
-    began, finished = time.perf_counter(), FinishedTasks(folder)
-    progress = ProgressFile(progress_file)
-    cancelled = CancelFile(cancel_file)
+def run_task(task: Task, cancelled: Cancel, report: TaskReport) -> TaskOutcome:
+    """Never raises: an error of a task is its outcome, and whoever ran it goes on."""
     try:
-        settle_encryption(folder.parent)  # a worker elsewhere may not know of the key
-        if finished.get(task.key) is None:
-            if cancelled():
-                raise Cancelled("stopped before it began")
-            finished.put(task.key, task.function(task.payload, cancelled, progress.write))
+        if cancelled():
+            raise Cancelled("stopped before it began")
+        return TaskOutcome(task.function(task.payload, cancelled, report).to_bytes())
     except Cancelled:
-        return TaskOutcome(task.key, time.perf_counter() - began, cancelled=True)
-    except (GlovecalError, BadEncryptionKey) as error:
-        return TaskOutcome(task.key, time.perf_counter() - began, error=f"{task.label}: {error}")
-    finally:
-        progress.remove()
-    return TaskOutcome(task.key, time.perf_counter() - began)
+        return TaskOutcome(cancelled=True)
+    except GlovecalError as error:
+        return TaskOutcome(error=f"{task.label}: {error}")
+    except MemoryError:
+        return TaskOutcome(
+            error=f"{task.label}: there is too little memory; run fewer workers, or fewer takes"
+        )
+    except Exception as error:
+        return TaskOutcome(error=mistake(error), trace=traceback.format_exc())
 
 
-class CancelFile:
-    """Says whether a file exists; looks 20 times a second at most, so it may be asked in every iteration."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._looked_at = float("-inf")
-        self._found = False
-
-    def __call__(self) -> bool:
-        now = time.monotonic()
-        if not self._found and now - self._looked_at >= CANCEL_POLL_S:
-            self._looked_at = now
-            self._found = self._path.exists()
-        return self._found
+def mistake(error: Exception) -> str:
+    """What a person is told of an error that nobody foresaw."""
+    return f"an error in Glovecal itself ({type(error).__name__}): the job's traceback tells where"

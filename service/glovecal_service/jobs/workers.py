@@ -1,8 +1,8 @@
 """The worker processes, started when the first task needs them.
 
 Dask distributed was chosen over procrastinate (needs PostgreSQL) and Ray (620 MB, 24 s to start): it starts
-in 2 s with SQLite alone, retries a task whose worker died, and a scheduler elsewhere is one setting. It is
-trusted with nothing but running: the database remembers jobs, the fits folder remembers results. It is
+in 2 s with SQLite alone and retries a task whose worker died. It is trusted with nothing but running: the
+database remembers jobs, the fits folder remembers results, and this process alone touches either. It is
 imported at the first task too: importing it takes a second that short commands do not have.
 
 Dask's processes run what they are sent, so they speak TLS and both sides have to show a certificate. That of
@@ -12,7 +12,7 @@ user of this computer can have it.
 
 from __future__ import annotations
 
-import asyncio
+import json
 import logging
 import os
 import subprocess
@@ -20,31 +20,27 @@ import sys
 import tempfile
 import threading
 import time
-from concurrent.futures import CancelledError
+import uuid
 from contextlib import suppress
-from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
+from weakref import WeakValueDictionary
 
-from glovecal_client.encryption.kept_file import is_encrypting
 from glovecal_client.errors import reason_of
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.dask_log import silence_dask
-from glovecal_service.jobs.job_kind import Task
-from glovecal_service.jobs.task_run import TaskOutcome, run_task
+from glovecal_service.jobs.job_kind import Task, TaskReport
+from glovecal_service.jobs.task_run import TaskOutcome
 from glovecal_service.operating_system import FORKS
 from glovecal_service.settings import Settings
 
 if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster, Security
+    from distributed import Client, Future, LocalCluster, Scheduler, Security
 
 _log = logging.getLogger("glovecal.jobs")
 
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
 LONGEST_ABSENCE_S = 45.0
-FETCH_WITHIN_S = 30.0
-"""A finished task's answer is a few hundred bytes."""
-CANCELLED = (asyncio.CancelledError, CancelledError)
 _CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.scheduler.allowed-failures": 2,
@@ -55,10 +51,11 @@ _CONFIG = {
     # takes no more than 32 MiB for the second.
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 256 << 20,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 << 20,
+    # What fills a worker's memory does not go to the disk, where it would lie as it is.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
 }
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
-_NOTHING_SPILLED = {"distributed.worker.memory.target": False, "distributed.worker.memory.spill": False}
-"""What fills a worker's memory does not go to the disk, where it would lie as it is."""
 _LONGEST_FOLDER = 75
 """Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
 _IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.questions.catalogue"]
@@ -80,6 +77,55 @@ class TaskKilledWorkers(GlovecalError):
     """A task brought down every process it was given to."""
 
 
+class HandedOut:
+    """A task on its way to a worker process, in it, or back. Whoever has it may drop it."""
+
+    def __init__(self, task: Task, report: TaskReport) -> None:
+        self._label = task.label
+        self._report = report
+        self._future: Future | None = None
+        self._outcome: TaskOutcome | None = None
+        self.weight = 0
+        """Bytes."""
+
+    def follow(self, future: Future, weight: int) -> None:
+        """Dask's own word on it."""
+        self._future, self.weight = future, weight
+
+    def hear(self, sentence: str, share: float, detail: str) -> None:
+        self._report(sentence, share, json.loads(detail))
+
+    def end(self, **outcome: Any) -> None:
+        self._outcome = TaskOutcome(**outcome)
+
+    @property
+    def is_over(self) -> bool:
+        return self._outcome is not None or (self._future is not None and self._future.done())
+
+    @property
+    def outcome(self) -> TaskOutcome:
+        """Once it is over. Raises WorkersLost, TaskKilledWorkers."""
+        from distributed import KilledWorker
+
+        future = self._future
+        assert future is not None
+        if self._outcome is not None:
+            return self._outcome
+        if future.status != "error":
+            raise WorkersLost("the scheduler of the training processes was lost", future.client)
+        error: Exception = cast(Any, future.exception())
+        if isinstance(error, KilledWorker):
+            raise TaskKilledWorkers(
+                f"{self._label}: every process that worked on it died (killed, or out of memory)"
+            ) from error
+        raise error  # a mistake in what Dask was asked to do
+
+    def drop(self) -> None:
+        """Nobody wants it any more: a worker that has it stops."""
+        if self._future is not None:
+            self._future.release()
+
+
 class Workers:
     """A Dask client that comes to life at the first ``submit``. Safe to use from several threads."""
 
@@ -90,6 +136,7 @@ class Workers:
         self._cluster: LocalCluster | None = None
         self._absent_since: float | None = None
         self._closed = False
+        self._handed_out: WeakValueDictionary[str, HandedOut] = WeakValueDictionary()
 
     @property
     def started(self) -> bool:
@@ -104,21 +151,23 @@ class Workers:
     @property
     def count(self) -> int:
         """How many tasks run at once."""
-        client = self._client
-        if self._settings.scheduler is None or client is None:
-            return self._settings.workers
-        return max(1, sum(cast(dict[str, int], client.nthreads()).values()))
+        return self._settings.workers
 
-    def submit(self, task: Task, folder: Path, cancel_file: Path, progress_file: Path) -> Future:
-        """Hand a task out. Raises WorkersLost."""
+    def submit(self, task: Task, report: TaskReport) -> HandedOut:
+        """Hand a task out; ``report`` is called in another thread. Raises WorkersLost."""
         from distributed.client import ClosedClientError
 
+        from glovecal_service.jobs.task_in_worker import packed, work_off
+
+        handed, key, sent = HandedOut(task, report), uuid.uuid4().hex, packed(task)
+        self._handed_out[key] = handed
         client = None
         try:
             client = self._started()
-            return client.submit(run_task, task, folder, cancel_file, progress_file, pure=False)
+            handed.follow(client.submit(work_off, sent, key=key), len(sent))
         except (OSError, TimeoutError, RuntimeError, ClosedClientError) as error:
             raise WorkersLost("the training processes cannot be reached", client) from error
+        return handed
 
     def check(self) -> None:
         """Raise WorkersLost when every process of our own has been gone for long.
@@ -153,26 +202,26 @@ class Workers:
 
     def pids(self) -> list[int]:
         """Process ids of the workers, none before they are started."""
-        client = self._client
-        return [] if client is None else list(cast(dict[str, int], client.run(_pid)).values())
+        cluster = self._cluster
+        return [] if cluster is None else [each.pid for each in cluster.workers.values()]
 
     def _started(self) -> Client:
         from dask.config import set as configure
-        from distributed import Client
+        from distributed import Client, Security
 
         silence_dask()
         with self._lock:
             if self._closed:
                 raise WorkersLost("the service is stopping")
             if self._client is None:
-                configure(_CONFIG | _NOTHING_SPILLED if is_encrypting() else _CONFIG)
+                configure(_CONFIG)
                 if FORKS and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
-                    security = _security(self._settings)
-                    address = self._settings.scheduler or self._local_cluster(security)
+                    security = Security.temporary()
+                    cluster = self._local_cluster(security)
                     self._client = Client(
-                        address, security=security, timeout=START_TIMEOUT_S, set_as_default=False
+                        cluster, security=security, timeout=START_TIMEOUT_S, set_as_default=False
                     )
                 except (OSError, TimeoutError, RuntimeError) as error:
                     self._close()
@@ -203,7 +252,22 @@ class Workers:
         assert scheduler is not None
         assert loop is not None
         loop.add_callback(scheduler.http_server.stop)  # it has nothing to show
+        self._listen(scheduler)
         return self._cluster
+
+    def _listen(self, scheduler: Scheduler) -> None:
+        """To what workers tell of tasks, in the scheduler's thread."""
+        from glovecal_service.jobs.task_in_worker import OUTCOME, PROGRESS
+
+        def progress(worker: str, key: str, **what: Any) -> None:
+            if (handed := self._handed_out.get(key)) is not None:
+                handed.hear(**what)
+
+        def over(worker: str, key: str, **outcome: Any) -> None:
+            if (handed := self._handed_out.get(key)) is not None:
+                handed.end(**outcome)
+
+        scheduler.stream_handlers.update({PROGRESS: progress, OUTCOME: over})
 
     def _close(self) -> None:
         client, self._client = self._client, None
@@ -213,21 +277,6 @@ class Workers:
             with suppress(TimeoutError, OSError):  # it is thrown away in any case
                 if part is not None:
                     part.close(timeout=timeout_s)
-
-
-def _security(settings: Settings) -> Security:
-    """Who may speak to the scheduler and the workers."""
-    from distributed import Security
-
-    if settings.scheduler is None:
-        return Security.temporary()
-    certificate, key = str(settings.scheduler_certificate), str(settings.scheduler_key)
-    return Security(
-        require_encryption=True,
-        tls_ca_file=str(settings.scheduler_ca),
-        tls_client_cert=certificate,
-        tls_client_key=key,
-    )
 
 
 def _reason(error: Exception) -> str:
@@ -249,39 +298,12 @@ def _reason(error: Exception) -> str:
     return "none can import what it needs; install Glovecal again (the log says what is missing)"
 
 
-LOOP_IS_CLOSED = "IOLoop is closed"
-"""What Dask says of a client that was closed between the announcement of a result and its fetching."""
-
-
-def finished(futures: list[Future], timeout_s: float) -> list[Future]:
-    """Those that are finished, after waiting ``timeout_s`` at most for the first.
-
-    Looks instead of calling Dask's ``wait``, which wants one client for the whole process.
-    """
+def finished(handed: list[HandedOut], timeout_s: float) -> list[HandedOut]:
+    """Those that are over, after waiting ``timeout_s`` at most for the first."""
     until = time.monotonic() + timeout_s
-    while not (done := [future for future in futures if future.done()]) and time.monotonic() < until:
+    while not (over := [each for each in handed if each.is_over]) and time.monotonic() < until:
         time.sleep(LOOK_S)
-    return done
-
-
-def outcome(future: Future, task: Task) -> TaskOutcome:
-    """What became of a finished future. Raises WorkersLost, TaskKilledWorkers."""
-    from distributed import KilledWorker
-    from distributed.client import ClosedClientError
-
-    try:
-        # a result can go with its process after it was announced; without a limit this would wait for ever
-        return future.result(timeout=FETCH_WITHIN_S)
-    except (*CANCELLED, OSError, TimeoutError, ClosedClientError) as error:
-        raise WorkersLost("the scheduler of the training processes was lost", future.client) from error
-    except RuntimeError as error:
-        if LOOP_IS_CLOSED not in str(error):  # a task's own error
-            raise
-        raise WorkersLost("another job has replaced the training processes", future.client) from error
-    except KilledWorker as error:
-        raise TaskKilledWorkers(
-            f"{task.label}: every process that worked on it died (killed, or out of memory)"
-        ) from error
+    return over
 
 
 def _import_once() -> None:
@@ -295,7 +317,3 @@ def _import_once() -> None:
 
     configure(_FORKED)
     get_mp_context().set_forkserver_preload(_IMPORTED_ONCE)
-
-
-def _pid() -> int:
-    return os.getpid()
