@@ -59,8 +59,11 @@ class Settings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = 8600
     login: Literal["beyond loopback", "always"] = "beyond loopback"
     """Who has to prove who they are: whoever asks a service that listens beyond loopback, or everybody."""
-    workers: Annotated[int, Field(ge=1, le=256)] = 2
-    """Training processes, one thread each."""
+    workers: Annotated[int, Field(ge=0, le=256)] = 2
+    """Training processes of this computer, one thread each; 0: training is left to ``glovecal worker`` on
+    others."""
+    worker_port: Annotated[int, Field(ge=1, le=65535)] = 8601
+    """Where workers on other computers are let in, at ``host``; closed while the site has no such member."""
     workers_idle_s: Annotated[float, Field(gt=0, le=86400)] = 60.0
     """Training processes that nobody has needed for so long are ended; the next job starts them anew."""
     oidc_client_id: str = ""

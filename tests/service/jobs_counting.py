@@ -33,6 +33,7 @@ class Counting:
 
 def count(work: Counting, cancelled: Callable[[], bool], report: TaskReport) -> TaskResult:
     note(work.ledger, f"begin {work.number} {os.getpid()}")
+    report(f"adding up to {work.number}", 0.0, {"number": work.number})
     until = time.monotonic() + work.seconds
     while time.monotonic() < until:
         if cancelled():

@@ -1,12 +1,14 @@
 """What any other user of this computer can try: take a port and make the process behind it run code.
 
 ``attack`` runs this file as another user. It goes through each port with a Dask client and with raw messages
-of Dask's that carry a pickle, each in the clear and over TLS with a certificate that the attacker made.
+of Dask's that carry a pickle, each in the clear and over TLS with a certificate that the attacker made, or
+was given for something else.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import pickle
 import subprocess
@@ -19,12 +21,16 @@ NOBODY = 65534
 GIVE_UP_S = 5.0
 
 
-def attack(ports: Sequence[int]) -> set[str]:
-    """Attack ``ports`` of 127.0.0.1 as NOBODY; what was run: ``PORT-KIND-UID`` for each success."""
+def attack(ports: Sequence[int], given: Mapping[str, str] | None = None) -> set[str]:
+    """Attack ``ports`` of 127.0.0.1 as NOBODY; what was run: ``PORT-KIND-UID`` for each success.
+
+    ``given``: PEM texts under Dask's names."""
     with tempfile.TemporaryDirectory() as folder:  # not pytest's, into which other users cannot look
         os.chmod(folder, 0o777)
         command = [sys.executable, __file__, folder, *map(str, ports)]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        run = subprocess.run(
+            command, input=json.dumps(given or {}), capture_output=True, text=True, timeout=120
+        )
         assert run.returncode == 0, run.stderr
         return set(os.listdir(folder))
 
@@ -80,7 +86,11 @@ if __name__ == "__main__":
     from distributed.client import Client  # noqa: F401
 
     # before the rights are gone that may be needed to read packages, cryptography among them
-    securities = {"tcp": Security(), "tls": Security.temporary()}
+    given = json.load(sys.stdin)
+    securities = {
+        "tcp": Security(),
+        "tls": Security(require_encryption=True, **given) if given else Security.temporary(),
+    }
     if os.getuid() == 0:
         os.setgroups([])
         os.setgid(NOBODY)

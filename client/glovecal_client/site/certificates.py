@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ssl
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -40,7 +41,7 @@ def check_certificate(member: Member) -> CertificateFacts:
     """
     whose = f"the certificate of {member.name!r} at site {member.site!r}"
     try:
-        peer = _server_side(member)
+        peer = peer_context(member)
         client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         client.check_hostname, client.verify_mode = False, ssl.CERT_NONE
         load_key(client, member)
@@ -50,7 +51,7 @@ def check_certificate(member: Member) -> CertificateFacts:
     except (ssl.SSLError, ValueError) as error:
         raise BadSiteFile(f"{whose} cannot be used: it and its private key do not fit together") from error
     return CertificateFacts(
-        _common_name(seen),
+        common_name_in(seen),
         _time(str(seen["notBefore"])),
         _time(str(seen["notAfter"])),
         tuple(str(name) for _, name in seen.get("subjectAltName", ())),
@@ -85,6 +86,14 @@ def server_context(member: Member) -> ssl.SSLContext:
     return context
 
 
+def peer_context(member: Member) -> ssl.SSLContext:
+    """For a service's other doors: shows its certificate, and lets in who has one of the same authority."""
+    context = server_context(member)
+    context.load_verify_locations(cadata=member.authority)
+    context.verify_mode = ssl.CERT_REQUIRED
+    return context
+
+
 def load_key(context: ssl.SSLContext, member: Member) -> None:
     """``ssl`` takes files only: for that moment they lie in a folder that nobody else can open.
 
@@ -95,13 +104,6 @@ def load_key(context: ssl.SSLContext, member: Member) -> None:
         with open(file, "w", encoding="ascii", opener=open_private) as stream:
             stream.write(member.private_key + member.certificate)
         context.load_cert_chain(file)
-
-
-def _server_side(member: Member) -> ssl.SSLContext:
-    context = server_context(member)
-    context.load_verify_locations(cadata=member.authority)
-    context.verify_mode = ssl.CERT_REQUIRED
-    return context
 
 
 def _shake_hands(client: ssl.SSLContext, server: ssl.SSLContext) -> dict[str, Any]:
@@ -117,7 +119,8 @@ def _shake_hands(client: ssl.SSLContext, server: ssl.SSLContext) -> dict[str, An
     return server_end.getpeercert() or {}
 
 
-def _common_name(seen: dict[str, Any]) -> str:
+def common_name_in(seen: Mapping[str, Any]) -> str:
+    """Of a certificate as ``getpeercert`` gives it; "" where it has none."""
     names = [value for part in seen.get("subject", ()) for name, value in part if name == "commonName"]
     return names[0] if names else ""
 

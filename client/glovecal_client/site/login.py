@@ -58,7 +58,7 @@ def _of_their_certificate(error: ssl.SSLCertVerificationError, host: str, member
         return f"the certificate of the service at {host} has expired; renew it there: glovecal site renew"
     return (
         f"the service at {host} belongs to another site than this computer's file (site {member.site!r}); "
-        "take a file made at that service: glovecal site add NAME --as viewer"
+        f"take a file made at that service: glovecal site add NAME --as {member.kind}"
     )
 
 
@@ -80,7 +80,7 @@ def _of_an_alert(error: ssl.SSLError, host: str, port: int, member: Member) -> s
     if "UNKNOWN_CA" in reason or "BAD_CERTIFICATE" in reason or "DECRYPT" in reason:
         return (
             f"the service at {host} does not know the authority of {member.name!r}: its file is of another "
-            "site, or of an earlier one; make a new file there: glovecal site add NAME --as viewer"
+            f"site, or of an earlier one; make a new file there: glovecal site add NAME --as {member.kind}"
         )
     if "CERTIFICATE" in reason:
         return f"the service at {host} refuses the certificate of {member.name!r}; make a new file there"

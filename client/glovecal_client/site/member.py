@@ -26,8 +26,8 @@ ENDPOINT = re.compile(r"tls/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z"
 REST_ADDRESS = re.compile(r"https://(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 _PEM = re.compile(r"(-----BEGIN ([A-Z ]+)-----\n[A-Za-z0-9+/=\n]+-----END \2-----\n)+\Z")
 
-Kind = Literal["service", "capture", "viewer"]
-"""A service makes poses; a capture sends what gloves measure; a viewer uses poses."""
+Kind = Literal["service", "capture", "viewer", "worker"]
+"""A service makes poses; a capture sends what gloves measure; a viewer uses poses; a worker trains."""
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
@@ -57,6 +57,8 @@ class Member:
     role: Role | None = None
     api_key: str | None = field(default=None, repr=False)
     """For REST."""
+    training: str | None = None
+    """Of a worker: where the service lets it in, such as ``tls/lab.example:8601``."""
 
     def document(self) -> str:
         """The file's content."""
@@ -137,6 +139,7 @@ def _member(document: Any) -> Member:
         gloves=tuple(check_identifier(each, "glove") for each in _texts(document, "gloves", fewest=0)),
         role=role,
         api_key=None if document.get("api_key") is None else _text(document, "api_key"),
+        training=_matching(_text(document, "training"), ENDPOINT, "training") if kind == "worker" else None,
     )
 
 

@@ -21,7 +21,7 @@ import typer.main
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
 from glovecal_client.program import handle_signals, run_command
 from glovecal_client.site.member import settle_environment
-from glovecal_service.cli import backup, completion, demo, overview, serve
+from glovecal_service.cli import backup, completion, demo, overview, serve, worker
 from glovecal_service.cli.access import audit, encryption, keys, log_mark, people
 from glovecal_service.cli.asking import verb, verb_at_once
 from glovecal_service.cli.camera import cameras
@@ -70,6 +70,7 @@ START, GLOVES, TAKES, CALIBRATE, EXPLAIN, KEEP = (
 """What people do, in the order in which they do it."""
 app.command("demo", rich_help_panel=START)(demo.demo)
 app.command("serve", rich_help_panel=START)(serve.serve)
+app.command("worker", rich_help_panel=START)(worker.worker)
 app.command("completion", rich_help_panel=START)(completion.completion)
 app.command("capture", cls=capture.WithDeviceOptions, rich_help_panel=GLOVES)(capture.capture)
 app.command("find-port", rich_help_panel=GLOVES)(find_port.find_port)

@@ -12,6 +12,7 @@ from glovecal_service.jobs.finished_tasks import FinishedTasks
 from glovecal_service.jobs.job_kind import JobKind
 from glovecal_service.jobs.job_run import JobRun
 from glovecal_service.jobs.owner import Owner
+from glovecal_service.jobs.worker_entrance import WorkerEntrance
 from glovecal_service.jobs.workers import Workers
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -36,7 +37,12 @@ class Dispatcher:
     ) -> None:
         """``of_one_command``: this process has nothing to do but wait for a job, so that it runs a job's only
         task itself and starts no workers for it."""
+        if of_one_command and not settings.workers:
+            settings = settings.model_copy(update={"workers": 1})  # nobody else could come
         self.workers = Workers(settings)
+        self._entrance = None
+        if settings.site_file is not None and not of_one_command:
+            self._entrance = WorkerEntrance(settings, self.workers)
         self._runs_single_tasks = of_one_command
         self._store = store
         self._folder = settings.fits_folder
@@ -55,6 +61,8 @@ class Dispatcher:
         self._owner = Owner(self._owners)
         self._owner.take_back_from_dead(self._store)
         FinishedTasks(self._folder).prune()
+        if self._entrance is not None:
+            self._entrance.start()
         self._thread.start()
 
     def wake(self) -> None:
@@ -71,6 +79,8 @@ class Dispatcher:
             run.stop()
             thread.join(timeout_s)
         self.workers.close()
+        if self._entrance is not None:
+            self._entrance.stop()
         if self._owner is not None:
             self._owner.close()
 
@@ -104,7 +114,11 @@ class Dispatcher:
         now = time.monotonic()
         if self._runs:
             self._busy_at = now
-        elif self.workers.started and now - self._busy_at > self._workers_idle_s:
+        elif (
+            self.workers.started
+            and not self.workers.has_guests
+            and now - self._busy_at > self._workers_idle_s
+        ):
             self.workers.reset()
 
     def _begin(self, job: JobRecord) -> None:

@@ -80,6 +80,7 @@ class JobRun:
         """Written by whoever runs a task."""
         self._noticed: dict[int, TaskProgress] = {}
         self._time_left: TimeLeft | None = None
+        self._absence: str | None = None
         self._ended = threading.Event()
         self._stopped = threading.Event()
         self._released = False
@@ -201,11 +202,19 @@ class JobRun:
                     running[self._workers.submit(plan.tasks[number], self._report(number))] = number
                     self._begin_to_count()
                 self._workers.check()
+                self._tell_absence()
                 for handed in finished(list(running), WATCH_S):
                     self._take(plan, running.pop(handed), handed.outcome, results)
         finally:
             for handed in running:
                 handed.drop()
+
+    def _tell_absence(self) -> None:
+        """Say once that nobody works, and once that somebody does again."""
+        absence = self._workers.absence
+        if absence != self._absence:
+            self._absence = absence
+            self._progress(self._fraction(), absence or "a worker is there: training", {})
 
     def _may_hand_out(self, running: Collection[HandedOut]) -> bool:
         if len(running) >= 2 * self._workers.count:

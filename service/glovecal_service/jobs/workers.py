@@ -5,9 +5,9 @@ in 2 s with SQLite alone and retries a task whose worker died. It is trusted wit
 database remembers jobs, the fits folder remembers results, and this process alone touches either. It is
 imported at the first task too: importing it takes a second that short commands do not have.
 
-Dask's processes run what they are sent, so they speak TLS and both sides have to show a certificate. That of
-our own processes is made at their start and signs itself; its key is in their memory alone, so that no other
-user of this computer can have it.
+Dask's processes run what they are sent, so they listen on loopback only and speak TLS, where both sides have
+to show a certificate. It is made at their start and signs itself; its key is in their memory alone, so that
+no other user of this computer can have it. Processes on other computers come through ``worker_entrance.py``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ import tempfile
 import threading
 import time
 import uuid
+from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 from weakref import WeakValueDictionary
 
@@ -41,7 +43,7 @@ _log = logging.getLogger("glovecal.jobs")
 START_TIMEOUT_S = 60
 LOOK_S = 0.01
 LONGEST_ABSENCE_S = 45.0
-_CONFIG = {
+CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1GB",
     "distributed.scheduler.allowed-failures": 2,
     "distributed.comm.timeouts.connect": "30s",
@@ -58,7 +60,7 @@ _CONFIG = {
 _FORKED = {"distributed.worker.multiprocessing-method": "forkserver"}
 _LONGEST_FOLDER = 75
 """Bytes: the name of a socket in the folder for temporary files has to fit into 107."""
-_IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.questions.catalogue"]
+IMPORTED_ONCE = ["distributed", "distributed.nanny", "scipy.signal", "glovecal_service.questions.catalogue"]
 """SciPy's signal package brings those for optimisation and statistics, which diagnoses use."""
 
 
@@ -75,6 +77,17 @@ class WorkersLost(GlovecalError):
 
 class TaskKilledWorkers(GlovecalError):
     """A task brought down every process it was given to."""
+
+
+@dataclass(frozen=True)
+class Invitation:
+    """What a process elsewhere needs to work for the scheduler of one start."""
+
+    port: int
+    """Of 127.0.0.1."""
+    keys: Mapping[str, str]
+    """PEM texts, as Dask names them: who has them may run code in all processes of that scheduler."""
+    client: Client
 
 
 class HandedOut:
@@ -134,8 +147,11 @@ class Workers:
         self._lock = threading.Lock()
         self._client: Client | None = None
         self._cluster: LocalCluster | None = None
+        self._security: Security | None = None
         self._absent_since: float | None = None
         self._closed = False
+        self.refusal = ""
+        """Why the last worker elsewhere that wanted to come in was not let in."""
         self._handed_out: WeakValueDictionary[str, HandedOut] = WeakValueDictionary()
 
     @property
@@ -151,7 +167,43 @@ class Workers:
     @property
     def count(self) -> int:
         """How many tasks run at once."""
-        return self._settings.workers
+        scheduler = self._scheduler
+        return max(1, self._settings.workers, 0 if scheduler is None else scheduler.total_nthreads)
+
+    @property
+    def has_guests(self) -> bool:
+        """Whether processes that this one did not start work for it."""
+        scheduler, cluster = self._scheduler, self._cluster
+        return scheduler is not None and cluster is not None and len(scheduler.workers) > len(cluster.workers)
+
+    @property
+    def absence(self) -> str | None:
+        """For a person: nobody is there to work, and this process starts nobody."""
+        scheduler = self._scheduler
+        if self._settings.workers or scheduler is None or scheduler.workers:
+            return None
+        why = f" (the last was refused: {self.refusal})" if self.refusal else ""
+        return (
+            "waiting for a worker: none is connected, and GLOVECAL_WORKERS=0 leaves training to others"
+            f"{why}. Start one: glovecal worker"
+        )
+
+    @property
+    def _scheduler(self) -> Scheduler | None:
+        cluster = self._cluster
+        return None if cluster is None else cast("Scheduler | None", cluster.scheduler)
+
+    def invite(self) -> Invitation:
+        """Start the scheduler, if need be, for processes elsewhere. Raises WorkersLost."""
+        client, scheduler, security = self._started(), self._scheduler, self._security
+        if scheduler is None or security is None:
+            raise WorkersLost("the service has lost its scheduler", client)
+        names = ("tls_ca_file", "tls_worker_cert", "tls_worker_key")
+        port = int(scheduler.address.rpartition(":")[2])
+        return Invitation(port, {name: str(getattr(security, name)) for name in names}, client)
+
+    def is_current(self, invitation: Invitation) -> bool:
+        return invitation.client is self._client
 
     def submit(self, task: Task, report: TaskReport) -> HandedOut:
         """Hand a task out; ``report`` is called in another thread. Raises WorkersLost."""
@@ -175,9 +227,8 @@ class Workers:
         Dask starts a killed process again, but gives up when that takes too long on a busy computer; tasks
         would then wait for ever.
         """
-        client, cluster = self._client, self._cluster
-        scheduler = None if cluster is None else cluster.scheduler
-        if client is None or scheduler is None or scheduler.workers:
+        client, scheduler = self._client, self._scheduler
+        if client is None or scheduler is None or scheduler.workers or not self._settings.workers:
             self._absent_since = None
             return
         now = time.monotonic()
@@ -214,11 +265,11 @@ class Workers:
             if self._closed:
                 raise WorkersLost("the service is stopping")
             if self._client is None:
-                configure(_CONFIG)
+                configure(CONFIG)
                 if FORKS and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER:
                     _import_once()
                 try:
-                    security = Security.temporary()
+                    security = self._security = Security.temporary()
                     cluster = self._local_cluster(security)
                     self._client = Client(
                         cluster, security=security, timeout=START_TIMEOUT_S, set_as_default=False
@@ -290,7 +341,7 @@ def _reason(error: Exception) -> str:
         return f"none answered within {START_TIMEOUT_S} s"
     if isinstance(error, OSError):
         return reason_of(error)
-    command = [sys.executable, "-P", "-c", "import " + ", ".join(_IMPORTED_ONCE)]
+    command = [sys.executable, "-P", "-c", "import " + ", ".join(IMPORTED_ONCE)]
     child = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if child.returncode == 0:
         return "each ends while it starts; the service's log says more"
@@ -316,4 +367,4 @@ def _import_once() -> None:
     from distributed.utils import get_mp_context
 
     configure(_FORKED)
-    get_mp_context().set_forkserver_preload(_IMPORTED_ONCE)
+    get_mp_context().set_forkserver_preload(IMPORTED_ONCE)

@@ -51,7 +51,7 @@ def init(host: Hosts = None) -> None:
     out.print(
         f"Site {register.site} is in {folder.folder}. The service answers to {', '.join(register.hosts)}.\n"
         f"Start it: GLOVECAL_SITE_FILE={folder.service_file}{elsewhere} glovecal serve\n"
-        "Add others: glovecal site add NAME --as capture (or viewer)\n"
+        "Add others: glovecal site add NAME --as capture (or viewer, worker)\n"
         f"Whoever has {folder.authority_key} can make members. To keep it elsewhere, move it away, and "
         "give its place to add and renew with --authority-key."
     )
@@ -60,7 +60,7 @@ def init(host: Hosts = None) -> None:
 @app.command("add")
 def add(
     name: Name,
-    kind: Annotated[Kind, typer.Option("--as", help="What it does: capture, viewer or service.")],
+    kind: Annotated[Kind, typer.Option("--as", help="What it does: capture, viewer, worker or service.")],
     glove: Annotated[
         list[str] | None,
         typer.Option("--glove", help="Of a capture: the only gloves it may publish; repeatable."),
@@ -80,11 +80,12 @@ def add(
         raise Refusal(f"{place} exists already; move it away, or choose another file with --to")
     member = folder.add(name, kind, gloves=glove or (), role=role, key=authority_key, days=days)
     _write(place, member, api_key=None if role is None else _key(settings, name, role))
+    starts = f"; glovecal worker, which connects to {member.training}" if kind == "worker" else ""
     bound = f", gloves {', '.join(member.gloves)}" if member.gloves else ""
     out.print(
         f"Wrote {place}: {name}, {kind}{bound}. It holds a private key: copy it to that computer only, "
         "readable for its user only.\n"
-        f"There: export GLOVECAL_SITE_FILE={place.name}"
+        f"There: export GLOVECAL_SITE_FILE={place.name}{starts}"
     )
 
 
@@ -104,11 +105,11 @@ def list_members(as_json: AsJson = False) -> None:
 def revoke(name: Name) -> None:
     """Let a member do nothing any more. A running service knows within a second."""
     settings, folder = _place()
-    folder.revoke(name)
+    row = folder.revoke(name)
     _revoke_key(settings, name)
     out.print(
         f"Revoked {name}. To let that computer in again, make it a new file: "
-        f"glovecal site add {name} --as viewer"
+        f"glovecal site add {name} --as {row.kind}"
     )
 
 
@@ -143,7 +144,7 @@ def renew(
 def _place() -> tuple[Settings, SiteFolder]:
     keep_private()
     settings = settings_of_environment()
-    return settings, SiteFolder(settings.data)
+    return settings, SiteFolder(settings.data, settings.worker_port)
 
 
 def _key(settings: Settings, name: str, role: Role) -> str:

@@ -65,8 +65,25 @@ class Register:
 
     @property
     def admitted(self) -> tuple[Admitted, ...]:
-        """Who the router lets in: all but the revoked."""
-        return tuple(Admitted(row.kind, row.number, row.gloves, row.revoked is None) for row in self.members)
+        """Who the router lets in: all but the revoked. A worker has nothing to do there."""
+        return tuple(
+            Admitted(row.kind, row.number, row.gloves, row.revoked is None)
+            for row in self.members
+            if row.kind != "worker"
+        )
+
+    def workers(self, now: datetime) -> dict[str, Row]:
+        """Who may train at that time, by common name."""
+        return {
+            row.common_name: row
+            for row in self.members
+            if row.kind == "worker" and row.revoked is None and datetime.fromisoformat(row.expires) > now
+        }
+
+    @property
+    def host(self) -> str:
+        """By which members call the service."""
+        return self.rest.removeprefix("https://").rpartition(":")[0]
 
     def living(self, name: str) -> Row | None:
         """The member of that name that is not revoked."""
@@ -76,8 +93,10 @@ class Register:
 class SiteFolder:
     """What ``glovecal site`` works on. Errors are BadInput, or those of the file system."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, worker_port: int | None = None) -> None:
+        """``worker_port``: where the service lets workers in, for files of these."""
         self.folder = data / FOLDER
+        self._worker_port = worker_port
 
     @property
     def members_file(self) -> Path:
@@ -247,6 +266,7 @@ class SiteFolder:
             issued.private_key,
             row.gloves,
             row.role,
+            training=f"tls/{register.host}:{self._worker_port}" if row.kind == "worker" else None,
         )
 
     def _authority(self, key: Path | None) -> Authority:
