@@ -58,6 +58,19 @@ def test_jobs_are_claimed_in_the_order_they_came(store):
     assert [job.id for job in iter(lambda: store.jobs.claim("me"), None)] == ids
 
 
+def test_subjects_take_turns(store):
+    """Who comes with three after somebody else's hundreds waits for a few of them."""
+    for name in ("anna", "ben", "carla"):
+        store.subjects.create(name)
+    queue = ["anna"] * 20 + ["ben"] * 3 + ["carla"] * 2
+    ids = [store.jobs.create("train", {}, subject=name).id for name in queue]
+    claimed = list(iter(lambda: store.jobs.claim("me"), None))
+    assert [job.subject for job in claimed[:9]] == [*["anna", "ben", "carla"] * 2, "anna", "ben", "anna"]
+    assert sorted(job.id for job in claimed) == sorted(ids)
+    of_anna = [job.id for job in claimed if job.subject == "anna"]
+    assert of_anna == ids[:20], "each in the order in which it came"
+
+
 def test_a_job_that_runs_past_its_lease_is_taken_over(timed, clock):
     job = timed.jobs.create("train", {"subject": "anna"})
     first = timed.jobs.claim("first")

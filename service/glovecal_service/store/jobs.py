@@ -37,6 +37,8 @@ class Jobs:
     def __init__(self, database: Database, clock: Callable[[], float] = time.time) -> None:
         self._database = database
         self._clock = clock
+        self._turns: dict[str | None, int] = {}
+        """When each subject was served last; forgotten with the process, which costs one round at most."""
 
     def create(self, kind: str, payload: Mapping[str, Any], *, subject: str | None = None) -> JobRecord:
         """Put a job into the queue. Raises BadInput (kind, or a payload that is not JSON)."""
@@ -61,7 +63,8 @@ class Jobs:
             return _noted(connection, id)
 
     def claim(self, owner: str) -> JobRecord | None:
-        """Take the oldest queued job, None if there is none. Jobs whose lease ran out are queued first."""
+        """Take a queued job, None if there is none: the oldest of the subject that has waited longest for its
+        turn, so that nobody waits behind another's hundreds. Jobs whose lease ran out are queued first."""
         table = tables.jobs
         with self._database.read() as connection:
             waiting = (table.c.state == "queued") | (
@@ -72,13 +75,13 @@ class Jobs:
         with self._database.write() as connection:
             self._requeue(connection, table.c.lease_until < self._clock())
             queued = table.c.state == "queued"
-            ids = connection.scalars(
-                select(table.c.id).where(queued).order_by(table.c.created_at, table.c.id)
-            )
-            for id in ids.all():
+            waiting = select(table.c.id, table.c.subject).where(queued)
+            rows = connection.execute(waiting.order_by(table.c.created_at, table.c.id)).all()
+            for id, subject in sorted(rows, key=lambda row: self._turns.get(row.subject, 0)):
                 mine = (table.c.id == id) & queued
                 with suppress(StoreDamaged):  # the job stays where it is, and lists name it
                     if change_rows(connection, table, mine, partial(self._claimed, owner), skip_locked=True):
+                        self._turns[subject] = 1 + max(self._turns.values(), default=0)
                         return _noted(connection, id)
         return None
 
