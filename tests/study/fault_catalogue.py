@@ -203,6 +203,8 @@ CATALOGUE = (
             SERVICE + "test_jobs_dispatcher.py::test_a_killed_worker_is_replaced_and_its_fit_repeated",
             SERVICE + "test_jobs_dispatcher.py::test_a_fit_that_kills_every_worker_fails_with_a_reason",
             SERVICE + "test_jobs_dispatcher.py::test_processes_that_never_come_back_are_replaced",
+            SERVICE + "site/test_remote_workers.py"
+            "::test_a_worker_killed_in_the_middle_is_replaced_and_its_fit_repeated",
         ),
         "a worker out of memory",
     ),

@@ -30,6 +30,7 @@ from glovecal_service.settings import Settings
 from glovecal_service.store.site.site_folder import Row, SiteFolder
 
 LOOK_EVERY_S = 0.5
+ENDS_WITHIN_S = 20.0
 _log = logging.getLogger("glovecal.jobs")
 
 
@@ -65,6 +66,8 @@ class WorkerEntrance:
         self._admitted: Mapping[str, Row] = {}
         self._guests: dict[str, Guest] = {}
         """By the word that lets a guest's further connections in."""
+        self._keyholders: dict[str, Invitation] = {}
+        """By common name; also of those who have gone again."""
         self._complaint = ""
         code_identity()  # while it is that of what this process has imported
         self._stopping = threading.Event()
@@ -76,7 +79,7 @@ class WorkerEntrance:
     def stop(self) -> None:
         self._stopping.set()
         if self._thread.ident is not None:
-            self._thread.join()
+            self._thread.join(ENDS_WITHIN_S)
 
     def _run(self) -> None:
         asyncio.run(self._serve())
@@ -104,7 +107,7 @@ class WorkerEntrance:
                 self._meet, host, port, ssl=context, ssl_handshake_timeout=GREETED_WITHIN_S
             )
         except OSError as error:
-            self._complain(f"no worker can come in at {host}, port {port}: {reason_of(error)}")
+            self._complain(f"none can come in at {host}, port {port}: {reason_of(error)}")
             return None
         _log.info("workers on other computers are let in at port %d", port)
         return server
@@ -122,9 +125,9 @@ class WorkerEntrance:
                     load_key(self._context, member)
                 self._member = member
         except (ClientError, BadInput) as error:
-            self._complain(f"workers on other computers: {error}")
+            self._complain(str(error))
         except OSError as error:  # of ssl, too
-            self._complain(f"workers on other computers cannot come in: {reason_of(error)}")
+            self._complain(f"none can come in: {reason_of(error)}")
 
     async def _dismiss_unwelcome(self) -> None:
         for guest in list(self._guests.values()):
@@ -135,12 +138,17 @@ class WorkerEntrance:
                 guest.close()
             elif not self._workers.is_current(guest.invitation):
                 guest.close()
+        for name in self._keyholders.keys() - self._admitted.keys():
+            invitation = self._keyholders.pop(name)
+            await asyncio.to_thread(
+                self._workers.reset, invitation.client
+            )  # with that, its keys open nothing
 
     def _complain(self, sentence: str) -> None:
         """Once, not every half second."""
         if sentence != self._complaint:
             self._complaint = sentence
-            _log.warning(sentence)
+            _log.warning("workers on other computers: %s", sentence)
 
     async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         line = Line(reader, writer)
@@ -154,7 +162,7 @@ class WorkerEntrance:
                 await self._connect(row, line, str(words.get("guest")))
         except Refused as refusal:
             self._workers.refusal = str(refusal)
-            self._complain(f"a worker was refused: {refusal}")
+            self._complain(f"one was refused: {refusal}")
             with suppress(Gone):
                 await line.say(refused=str(refusal))
             await line.end()
@@ -193,6 +201,7 @@ class WorkerEntrance:
         try:
             invitation = await asyncio.to_thread(self._workers.invite)
             guest = self._guests[word] = Guest(row, invitation, line)
+            self._keyholders[row.common_name] = invitation
             await line.say(guest=word, keys=invitation.keys)
             _log.info("worker %s came", row.name)
             await _until_gone(line.hear)

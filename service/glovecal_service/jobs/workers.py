@@ -185,7 +185,7 @@ class Workers:
         why = f" (the last was refused: {self.refusal})" if self.refusal else ""
         return (
             "waiting for a worker: none is connected, and GLOVECAL_WORKERS=0 leaves training to others"
-            f"{why}. Start one: glovecal worker"
+            f"{why}. Start one: glovecal worker, which says on its terminal what keeps it out"
         )
 
     @property

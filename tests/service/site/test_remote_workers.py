@@ -221,12 +221,14 @@ def test_a_revoked_worker_is_shut_out_in_the_middle(service: Service, start, tmp
     worker = start("leaver")
     job = service.count(ledger, 4, seconds=2.0)
     wait_for(lambda: noted(ledger, "begin"))
+    scheduler = service.dispatcher.workers.address
     service.folder.revoke("leaver")
     worker.shows("was revoked, or has expired; make one at the service", TOLD_WITHIN_S)
     assert worker.process.wait(30) != 0
     assert not noted(ledger, "done")
     start("stayer")
     assert result_of(service.store, job.id)["sums"] == [10]
+    assert service.dispatcher.workers.address != scheduler, "the keys that it was given open nothing"
 
 
 async def _greeted(member: Member, port: int) -> bytes:

@@ -7,17 +7,16 @@ Two minutes: ``python3 do.py test -m slow tests/service/site/test_site_of_comput
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from site_computers import Computers
 from site_support import eventually
 
 from glovecal_service.settings import Settings
@@ -31,68 +30,10 @@ CUT_S = 9.0
 """Longer than what the systems' buffers between capture and service hold."""
 
 
-def ip(*words: str) -> None:
-    subprocess.run(["ip", *words], check=True, capture_output=True, text=True)
-
-
-class Computers:
-    """Network namespaces joined by a switch, and a folder for each."""
-
-    def __init__(self, place: Path) -> None:
-        self.place, self._names = place, {name: f"gc{os.getpid()}-{name}" for name in (*ADDRESSES, "switch")}
-        self._hosts = place / "hosts"
-        self._hosts.write_text("127.0.0.1 localhost\n" + "".join(f"{NAMES[name]} {name}\n" for name in NAMES))
-
-    def build(self, undo: ExitStack) -> None:
-        """Raises OSError, CalledProcessError where this user or system cannot."""
-        for name in self._names.values():
-            ip("netns", "add", name)
-            undo.callback(ip, "netns", "del", name)
-            ip("-n", name, "link", "set", "lo", "up")
-        switch = self._names["switch"]
-        ip("-n", switch, "link", "add", "switch", "type", "bridge")
-        ip("-n", switch, "link", "set", "switch", "up")
-        for number, (name, address) in enumerate(ADDRESSES.items()):
-            port, there = f"port{number}", self._names[name]
-            ip("-n", switch, "link", "add", port, "type", "veth", "peer", "name", "eth0", "netns", there)
-            ip("-n", switch, "link", "set", port, "master", "switch", "up")
-            ip("-n", there, "address", "add", f"{address}/24", "dev", "eth0")
-            ip("-n", there, "link", "set", "eth0", "up")
-            self.folder(name).mkdir()
-        subprocess.run(self._command("service", "true"), check=True, capture_output=True)
-
-    def folder(self, computer: str) -> Path:
-        return self.place / computer
-
-    def start(self, computer: str, line: str, **more: str) -> subprocess.Popen[str]:
-        """A line of a shell in the computer's folder."""
-        known = {name: value for name, value in os.environ.items() if not name.startswith("GLOVECAL_")}
-        path = f"{Path(sys.executable).parent}{os.pathsep}{known['PATH']}"
-        home = {"HOME": str(self.folder(computer)), "PATH": path, "COLUMNS": "200"}
-        return subprocess.Popen(
-            self._command(computer, line), cwd=self.folder(computer), env=known | home | more, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
-
-    def _command(self, computer: str, line: str) -> list[str]:
-        told = f"mount --bind {self._hosts} /etc/hosts && {line}"
-        return ["ip", "netns", "exec", self._names[computer], "sh", "-c", told]
-
-    def run(self, computer: str, line: str, **more: str) -> str:
-        process = self.start(computer, line, **more)
-        said, complained = process.communicate(timeout=300)
-        assert process.returncode == 0, complained
-        return said
-
-    def plug(self, computer: str, is_in: bool) -> None:
-        port = f"port{list(ADDRESSES).index(computer)}"
-        ip("-n", self._names["switch"], "link", "set", port, "up" if is_in else "down")
-
-
 @pytest.fixture(scope="module")
 def computers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Computers]:
     with ExitStack() as undo:
-        found = Computers(tmp_path_factory.mktemp("computers"))
+        found = Computers(tmp_path_factory.mktemp("computers"), ADDRESSES, NAMES)
         try:
             found.build(undo)
         except (OSError, subprocess.CalledProcessError) as error:
