@@ -9,12 +9,13 @@ import hashlib
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points, version
+from importlib.resources import files
 from pathlib import Path
 
-from glovecal_models.effects import catalogue
+from glovecal_models.effects.catalogue import GROUP
 
 _JOBS = Path(__file__).parent
-_SOURCE = Path(catalogue.__file__).parents[1], _JOBS.parent / "questions", _JOBS
+_SOURCE = Path(str(files("glovecal_models"))), _JOBS.parent / "questions", _JOBS
 _PACKAGES = "numpy", "scipy", "distributed"
 _LONGEST, _MOST_SHOWN = 60, 4
 
@@ -23,11 +24,7 @@ _LONGEST, _MOST_SHOWN = 60, 4
 def code_identity() -> Mapping[str, str]:
     """By part: ``glovecal`` (its version), ``source`` (a hash), packages, and those with effects of a user's
     own."""
-    own = {
-        each.dist.name: each.dist.version
-        for each in entry_points(group=catalogue.GROUP)
-        if each.dist is not None
-    }
+    own = {each.dist.name: each.dist.version for each in entry_points(group=GROUP) if each.dist is not None}
     packages = {name: version(name) for name in _PACKAGES}
     return {"glovecal": version("glovecal-service"), "source": _source_hash()} | packages | own
 
