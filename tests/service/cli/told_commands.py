@@ -30,7 +30,7 @@ SAMPLES = {
     "named": "--take 0123456789ab", "field": "0123456789ab", "effect": "hysteresis",
     "table": "FILE", "layout": "cyberglove18", "TAKE": "0123456789ab", "DEVICE": "simulated",
     "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "needed": "trainer",
-    "device": "lucidglove:/dev/ttyUSB0",
+    "device": "lucidglove:/dev/ttyUSB0", "kind": "worker",
 }  # fmt: skip
 
 
