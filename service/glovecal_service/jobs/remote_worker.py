@@ -23,7 +23,7 @@ from glovecal_client.site.login import why_refused
 from glovecal_client.site.member import ENDPOINT, Member, read_member
 from glovecal_models.errors import BadInput
 from glovecal_service.jobs.code_identity import code_identity
-from glovecal_service.jobs.worker_process import OTHER_CODE
+from glovecal_service.jobs.worker_process import OTHER_CODE, SCHEDULER_LOST
 from glovecal_service.jobs.worker_talk import GREETED_WITHIN_S, SCHEDULER, WORK, Gone, Line, pass_on
 
 CONNECTED_WITHIN_S = 3.0
@@ -186,7 +186,7 @@ class RemoteWorker:
                 raise BadInput(
                     "Glovecal was changed on this computer since this command began: start it again"
                 )
-            if code:
+            if code not in (0, SCHEDULER_LOST):
                 how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
                 self._say(f"A training process {how}; starting another.")
             await asyncio.sleep(AGAIN_AFTER_S)
@@ -200,7 +200,7 @@ class RemoteWorker:
                     await pass_on(local, line)
             finally:
                 line.close()
-        except Gone:
+        except (Gone, asyncio.CancelledError):  # the latter at the end: asyncio would log it
             pass
         finally:
             local.close()

@@ -170,7 +170,7 @@ class WorkerEntrance:
             with suppress(Gone):
                 await line.say(later=str(error))
             await line.end()
-        except Gone:
+        except (Gone, asyncio.CancelledError):  # the latter when the service stops: asyncio would log it
             pass
         finally:
             line.close()

@@ -28,9 +28,8 @@ from glovecal_service.operating_system import step_back
 
 NOWHERE = 9
 """A port that nobody listens at: the scheduler never connects to a worker."""
-_SCHEDULER_LOST = 3
-OTHER_CODE = 4
-"""Exit code: what is installed here is not what the service was told of."""
+SCHEDULER_LOST, OTHER_CODE = 3, 4
+"""Exit codes; the latter: what is installed here is not what the service was told of."""
 
 
 def main() -> None:
@@ -45,7 +44,7 @@ def main() -> None:
     keep_private()
     with tempfile.TemporaryDirectory(prefix="glovecal-worker-") as folder:
         asyncio.run(_work(begin, folder))
-    os._exit(_SCHEDULER_LOST)  # a fit may still be running in a thread
+    os._exit(SCHEDULER_LOST)  # a fit may still be running in a thread
 
 
 def _end_with_the_parent() -> None:
