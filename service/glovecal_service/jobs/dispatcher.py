@@ -112,13 +112,9 @@ class Dispatcher:
     def _end_idle_workers(self) -> None:
         """Processes and ports that no job needs are closed; only this thread begins jobs."""
         now = time.monotonic()
-        if self._runs:
+        if self._runs or (self._entrance is not None and self._entrance.has_guests):
             self._busy_at = now
-        elif (
-            self.workers.started
-            and not self.workers.has_guests
-            and now - self._busy_at > self._workers_idle_s
-        ):
+        elif self.workers.started and now - self._busy_at > self._workers_idle_s:
             self.workers.reset()
 
     def _begin(self, job: JobRecord) -> None:

@@ -68,10 +68,16 @@ class WorkerEntrance:
         """By the word that lets a guest's further connections in."""
         self._keyholders: dict[str, Invitation] = {}
         """By common name; also of those who have gone again."""
+        self._taken_in = 0
         self._complaint = ""
         code_identity()  # while it is that of what this process has imported
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="worker-entrance", daemon=True)
+
+    @property
+    def has_guests(self) -> bool:
+        """Whether workers are there, or about to be: the scheduler has to stay for them."""
+        return self._taken_in > 0
 
     def start(self) -> None:
         self._thread.start()
@@ -198,6 +204,7 @@ class WorkerEntrance:
         """Raises Gone, WorkersLost."""
         saying = asyncio.create_task(_until_gone(line.say_alive))  # the scheduler may take long to start
         word = secrets.token_hex(16)
+        self._taken_in += 1
         try:
             invitation = await asyncio.to_thread(self._workers.invite)
             guest = self._guests[word] = Guest(row, invitation, line)
@@ -206,6 +213,7 @@ class WorkerEntrance:
             _log.info("worker %s came", row.name)
             await _until_gone(line.hear)
         finally:
+            self._taken_in -= 1
             saying.cancel()
             guest = self._guests.pop(word, None)
             if guest is not None:

@@ -171,12 +171,6 @@ class Workers:
         return max(1, self._settings.workers, 0 if scheduler is None else scheduler.total_nthreads)
 
     @property
-    def has_guests(self) -> bool:
-        """Whether processes that this one did not start work for it."""
-        scheduler, cluster = self._scheduler, self._cluster
-        return scheduler is not None and cluster is not None and len(scheduler.workers) > len(cluster.workers)
-
-    @property
     def absence(self) -> str | None:
         """For a person: nobody is there to work, and this process starts nobody."""
         scheduler = self._scheduler

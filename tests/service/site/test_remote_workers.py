@@ -90,14 +90,14 @@ class Worker:
 class Service:
     """A store and a dispatcher without workers of its own, at a site on loopback."""
 
-    def __init__(self, place: Path, port: int) -> None:
+    def __init__(self, place: Path, port: int, workers_idle_s: float = 60.0) -> None:
         self.place, self.port = place, port
         place.mkdir(mode=0o700)
         self.folder = SiteFolder(place, port)
         self.folder.begin("lab", [], zenoh_port=7447, rest_port=8600)
         self.settings = Settings(
             data=place, database=None, artifacts=None, workers=0, site_file=self.folder.service_file,
-            worker_port=port, host="127.0.0.1",
+            worker_port=port, host="127.0.0.1", workers_idle_s=workers_idle_s,
         )  # fmt: skip
         self.store = Store.open(self.settings)
         self.dispatcher = Dispatcher(self.store, self.settings, {"count": CountingJob()})
@@ -139,7 +139,9 @@ def start(service: Service, tmp_path: Path) -> Iterator[Callable[..., Worker]]:
     yield begin
     for worker in started:
         worker.stop()
-    wait_for(lambda: not service.dispatcher.workers.has_guests)
+    entrance = service.dispatcher._entrance
+    assert entrance is not None
+    wait_for(lambda: not entrance.has_guests)
 
 
 def test_a_worker_without_the_data_folder_trains(service: Service, start, tmp_path: Path) -> None:
@@ -285,6 +287,21 @@ def test_a_worker_of_another_site_is_told_why(service: Service, start, tmp_path:
         stranger.shows("belongs to another site than this computer's file", TOLD_WITHIN_S + 10)
     finally:
         stranger.stop()
+
+
+def test_a_worker_comes_although_nothing_was_to_do_for_long(tmp_path: Path) -> None:
+    """The scheduler is not ended as idle before the worker's processes are there; it is when they went."""
+    service = Service(tmp_path / "data", free_port(), workers_idle_s=0.01)
+    worker = Worker(tmp_path / "late", service.folder.add("late", "worker"))
+    try:
+        worker.shows("late works for the service", 60)
+        assert result_of(service.store, service.count(tmp_path / "ledger", 3).id)["sums"] == [6]
+        assert not [line for line in worker.lines if "went away" in line]
+        worker.stop()
+        wait_for(lambda: not service.dispatcher.workers.started)
+    finally:
+        worker.stop()
+        service.stop()
 
 
 def test_where_no_service_is_that_is_told(service: Service, tmp_path: Path) -> None:
