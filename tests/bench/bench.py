@@ -1,9 +1,9 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Seven parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+Eight parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
 to pose through real zenoh, the same with a site's certificates beside one without, inverse kinematics against
-mink, the studio's Live page in a browser, live bridges, and retargeting to skeletons like those of other
-programs. Figures and the picture go to a folder.
+mink, the studio's Live page in a browser, live bridges, retargeting to skeletons like those of other
+programs, and lists of a store that is large. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ PARTS = {
     "studio": "studio_bench.py",
     "bridges": "bridges_bench.py",
     "retargeting": "retargeting_table.py",
+    "lists": "lists_bench.py",
 }
-USUAL = tuple(name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting"))
-"""The first three want a quiet computer, the studio a browser too; the last has no peer."""
+USUAL = tuple(name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists"))
+"""The first three want a quiet computer, the studio a browser too; the last two have no peer."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
