@@ -26,7 +26,9 @@ PARTS = {
     "retargeting": "retargeting_table.py",
     "lists": "lists_bench.py",
 }
-USUAL = tuple(name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists"))
+USUAL = tuple(
+    name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists")
+)
 """The first three want a quiet computer, the studio a browser too; the last two have no peer."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 

@@ -1,4 +1,4 @@
-"""Lists, ``/ready`` and pages over a store as a site has it after years, and what memory the web process takes.
+"""Lists, ``/ready`` and pages over a store as a site has it after years, and the memory of the web process.
 
     python tests/bench/lists_bench.py [--quick] [--smoke] [--store FOLDER] [--json FILE]
 
@@ -101,7 +101,7 @@ def _lists(http: httpx.Client) -> Iterator[tuple[str, float]]:
         asked = {"": {}} | {words: query for words, query in ASKED.items() if set(query) <= known}
         for words, query in asked.items():
             yield _listed(http, f"{path} {words}".strip(), path, query)
-        late = http.get(path)
+        late, query = http.get(path), {}
         for _ in range(LATE):
             if "next" not in late.links or late.elapsed.total_seconds() > SLOW_S:
                 break

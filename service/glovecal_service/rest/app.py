@@ -41,6 +41,7 @@ from glovecal_service.rest.glove import (
 )
 from glovecal_service.rest.http import health
 from glovecal_service.rest.http.access import AccessGuard
+from glovecal_service.rest.http.damage_search import search_for_damage
 from glovecal_service.rest.http.dependencies import Parts, Predictors
 from glovecal_service.rest.http.error_handlers import AllowedMethods, install_error_handlers
 from glovecal_service.rest.http.observation import PREFIX, Metrics, Observation
@@ -165,10 +166,12 @@ def create_app(
         dispatcher = Dispatcher(opened, settings, ANSWERED, of_one_command=of_one_command)
         dispatcher.start()
         sweeping = asyncio.create_task(_sweep_hourly(opened, settings))
+        searching = asyncio.create_task(search_for_damage(opened))
         try:
             yield
         finally:
             sweeping.cancel()
+            searching.cancel()
             await run_in_threadpool(app.state.parts.filming.close)
             await run_in_threadpool(app.state.parts.cameras.close)
             await run_in_threadpool(app.state.parts.streamed_glove.stop)

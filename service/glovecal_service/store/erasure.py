@@ -33,6 +33,7 @@ from glovecal_service.store.belongings import (
     recording_files,
 )
 from glovecal_service.store.changes import tell_forgotten_subject
+from glovecal_service.store.damages import forget_damages_of
 from glovecal_service.store.database import new_id, now
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import OPEN_RECORDING_STATES, JobRecord
@@ -210,6 +211,7 @@ def _remove_rows(connection: Connection, of: Belongings, jobs: Iterable[JobRecor
             tables.model_takes.c.model.in_(models) if table is tables.model_takes else table.c.subject == name
         )
         removed[table.name] += connection.execute(delete(table).where(which)).rowcount
+    forget_damages_of(connection, name)
     others = [job.id for job in jobs if job.subject != name]
     removed[tables.jobs.name] += _delete_ids(connection, tables.jobs, others)
     for glove in connection.execute(select(tables.gloves)).all():

@@ -212,12 +212,27 @@ class Models:
         try:
             self._artifacts.verify(model.id)
         except (DamagedArtifact, NotFound) as error:
-            with self._database.read() as connection:
-                current = _current(connection, model.subject, model.layout, model.hand)
-            before = current is not None and current.model == model.id and current.previous is not None
-            remedies = other_remedies(model, can_roll_back=before)
-            return f"model {model.id[:12]} cannot be loaded: {error}{remedies}"
+            return self._damage(model, error)
         return ""
+
+    def damage_of(self, row: dict[str, Any]) -> str:
+        """The same of a row, which was checked, and by reading the artifact in any case. "" for one that was
+        removed."""
+        model = _record(row)
+        try:
+            if not model.is_removed:
+                self._artifacts.get(model.id)
+        except (DamagedArtifact, NotFound) as error:
+            return self._damage(model, error)
+        return ""
+
+    def _damage(self, model: ModelRecord, error: Exception) -> str:
+        with self._database.read() as connection:
+            current = _current(connection, model.subject, model.layout, model.hand)
+        active = current if current is not None and current.model == model.id else None
+        remedies = other_remedies(model, can_roll_back=active is not None and active.previous is not None)
+        remove = "" if active else f", or remove it: glovecal model remove {model.id[:12]}"
+        return f"model {model.id[:12]} cannot be loaded: {error}{remedies}{remove}"
 
     def activations(self, subject: str, layout: str) -> list[Activation]:
         """What was active since when, oldest first."""

@@ -35,7 +35,7 @@ from glovecal_service.store.errors import NotFound
 _OWN = {tables.subjects: tables.subjects.c.name} | {
     table: table.c.subject
     for table in (tables.takes, tables.models, tables.activations, tables.recordings, tables.samplings,
-                  tables.jobs)
+                  tables.jobs, tables.damages)
 }  # fmt: skip
 _OF_A_PARENT = {
     tables.model_takes: (tables.model_takes.c.model, tables.models),

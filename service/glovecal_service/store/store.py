@@ -15,6 +15,7 @@ from glovecal_service.store.actor import NOBODY_ELSE, Actor
 from glovecal_service.store.audit import Audit
 from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
 from glovecal_service.store.changes import Changes, changes_since
+from glovecal_service.store.damages import Damages
 from glovecal_service.store.data_folder_lock import LOCK, WHO
 from glovecal_service.store.database import Database
 from glovecal_service.store.gloves import Gloves
@@ -45,6 +46,7 @@ class Store:
         self.gloves = Gloves(database)
         self.takes = Takes(database, artifacts)
         self.models = Models(database, artifacts)
+        self.damages = Damages(database, artifacts, self.models)
         self.recordings = Recordings(database)
         self.samplings = Samplings(database)
         self.jobs = Jobs(database, clock)

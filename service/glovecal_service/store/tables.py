@@ -27,6 +27,7 @@ from sqlalchemy import (
     Text,
     TypeDecorator,
     UniqueConstraint,
+    text,
 )
 
 if TYPE_CHECKING:
@@ -195,7 +196,15 @@ takes = Table(
     Column("created_at", UtcTime, nullable=False),
     Column("row_sha256", SHA256, nullable=False, server_default=""),
     UniqueConstraint("subject", "layout", "frames_sha256"),
+    Index(None, "created_at", "id"),
+    Index(None, "subject", "created_at", "id"),
 )
+
+IS_REMOVED = {
+    "sqlite": """instr(facts, '"removed_at":') > 0""",
+    "postgresql": "(facts ->> 'removed_at') IS NOT NULL",
+}
+"""Of a model, by dialect: the condition of an index, which statements have to repeat to the letter."""
 
 models = Table(
     "models",
@@ -210,6 +219,15 @@ models = Table(
     Column("hand", String(8)),
     Column("row_sha256", SHA256, nullable=False),
     Index(None, "subject", "layout"),
+    Index(None, "created_at", "id"),
+    Index(None, "subject", "created_at", "id"),
+    Index(
+        "ix_models_removed",
+        "created_at",
+        "id",
+        sqlite_where=text(IS_REMOVED["sqlite"]),
+        postgresql_where=text(IS_REMOVED["postgresql"]),
+    ),
 )
 
 model_takes = Table(
@@ -248,6 +266,9 @@ recordings = Table(
     Column("requested_at", UtcTime, nullable=False),
     Column("updated_at", UtcTime, nullable=False),
     Column("row_sha256", SHA256, nullable=False, server_default=""),
+    Index(None, "requested_at", "id"),
+    Index(None, "glove", "requested_at", "id"),
+    Index(None, "subject", "requested_at", "id"),
 )
 
 samplings = Table(
@@ -268,6 +289,7 @@ samplings = Table(
     Column("created_at", UtcTime, nullable=False),
     Column("updated_at", UtcTime, nullable=False),
     Column("row_sha256", SHA256, nullable=False, server_default=""),
+    Index(None, "created_at", "id"),
 )
 
 jobs = Table(
@@ -295,6 +317,9 @@ jobs = Table(
     Column("traceback", Text),
     Column("row_sha256", SHA256, nullable=False, server_default=""),
     Index(None, "state", "created_at"),
+    Index(None, "created_at", "id"),
+    Index(None, "subject", "created_at", "id"),
+    Index(None, "finished_at"),
 )
 
 job_events = Table(
@@ -378,6 +403,18 @@ audit = Table(
     Column("previous", SHA256, nullable=False),
     Column("sha256", SHA256, nullable=False),
 )
+
+damages = Table(
+    "damages",
+    metadata,
+    Column("table", NAME, primary_key=True),
+    Column("id", String(200), primary_key=True),
+    Column("subject", NAME),
+    Column("sentence", Text, nullable=False),
+    Column("found_at", UtcTime, nullable=False),
+    Index(None, "found_at"),
+)
+"""What the search for damage found, until it is sound again or gone."""
 
 audit_head = Table(
     "audit_head",

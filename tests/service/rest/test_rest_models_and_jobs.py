@@ -169,6 +169,12 @@ def test_a_damaged_artifact_is_named_and_the_last_good_model_stays(
         client.post(f"/models/{bad}/activate")
 
 
+def search_for_damage(settings: Settings) -> None:
+    with Store.open(settings) as store:
+        for _ in store.damages.search():
+            pass
+
+
 def test_a_damaged_active_model_is_told_with_what_to_do(client: RestClient, settings: Settings) -> None:
     first, model = trained(client), trained(client, takes=[client.get("/takes")[0]["id"]])
     layout = client.get("/takes")[0]["layout"]
@@ -181,6 +187,7 @@ def test_a_damaged_active_model_is_told_with_what_to_do(client: RestClient, sett
     assert client.get("/health/ready")["problems"] == []
     for change in (content[:-1] + bytes([content[-1] ^ 1]), content[:100], None):
         path.unlink() if change is None else path.write_bytes(change)
+        search_for_damage(settings)
         [problem] = client.get("/health/ready")["problems"]
         assert problem.startswith(f"model {model[:12]} cannot be loaded: artifact {model}")
         assert problem.endswith(
@@ -191,7 +198,16 @@ def test_a_damaged_active_model_is_told_with_what_to_do(client: RestClient, sett
         with pytest.raises(Refused) as refused:
             client.get(f"/models/{model}")
         assert (refused.value.status, refused.value.detail) == (500, problem)
+    path.write_bytes(content)
+    search_for_damage(settings)
+    assert client.get("/health/ready")["problems"] == []
+    path.unlink()
+    with pytest.raises(Refused, match="missing"):
+        client.get(f"/models/{model}")
+    assert len(client.get("/health/ready")["problems"]) == 1, "whoever asks for it finds it at once"
     client.post("/models/rollback", {"subject": "anna", "layout": layout})
+    client.delete(f"/models/{model}")
+    search_for_damage(settings)
     assert client.get("/health/ready")["problems"] == []
     assert [row["id"] for row in client.get("/models") if row["active"]] == [first]
 

@@ -29,7 +29,7 @@ from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem, problems
 from glovecal_service.restarts import AWAY_TIMES, AWAY_WITHIN_S, TOLD_FOR_S, Restarts
 from glovecal_service.store.blobs import LEAST_FREE_BYTES
-from glovecal_service.store.errors import StoreDamaged, StoreError
+from glovecal_service.store.errors import StoreError
 from glovecal_service.store.store import Store
 
 router = APIRouter(tags=["health"])
@@ -37,6 +37,8 @@ router = APIRouter(tags=["health"])
 REALTIME_ALIVE = "realtime.alive"
 """A file in the data folder that the real-time process touches once a second."""
 SEEN_WITHIN_S = 5.0
+MOST_DAMAGES = 20
+"""That are named; of more their number is."""
 
 
 class Live(BaseModel):
@@ -53,7 +55,8 @@ class Ready(Storage):
     realtime_seen_s_ago: float
     realtime_restarts: int = Field(description="In the last 10 minutes; 503 after three within one.")
     problems: list[str] = Field(
-        description="What does not keep the service from working, such as a damaged active model: what to do."
+        description="What does not keep the service from working, such as a damaged model: what to do. "
+        "Damage is looked for without end, and everything is looked at about once an hour."
     )
 
 
@@ -124,7 +127,7 @@ def _no_realtime(seen_s_ago: float | None) -> str:
 
 def _check_database(store: Store) -> None:
     try:
-        store.subjects.list()
+        store.revision()
     except StoreError as error:
         raise Problem(503, "not-ready", f"the database does not work: {error}") from error
 
@@ -144,9 +147,12 @@ def _check_artifacts(store: Store, data: Path) -> str:
 
 def _problems(store: Store) -> list[str]:
     try:
-        return [damage for model in store.models.all_active() if (damage := store.models.damage(model))]
-    except StoreDamaged as error:
+        found, total = store.damages.list(limit=MOST_DAMAGES)
+    except StoreError as error:
         return [str(error)]
+    told = [damage.sentence for damage in found]
+    more = total - len(told)
+    return told + ([f"{more} more are damaged; the service's log names each"] if more else [])
 
 
 pages = APIRouter(include_in_schema=False)

@@ -27,7 +27,8 @@ class Model(Row):
         description="Whether live frames of the subject with the layout are predicted by it."
     )
     damage: str | None = Field(
-        description="Of an active model in a list: why its artifact cannot be loaded, and what to do."
+        description="Why its artifact cannot be loaded, and what to do; found by the search for damage, or "
+        "when the model was last asked for."
     )
     held_out_rmse_deg: float | None = Field(description="Error on takes left out of training, degrees.")
     rmse_unseen_wearing_deg: float | None = Field(

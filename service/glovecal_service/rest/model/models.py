@@ -33,6 +33,7 @@ from glovecal_service.rest.model.answer import (
     Rotation,
     UnseenWearingView,
 )
+from glovecal_service.store import tables
 from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import NAME, NOTE, Activation, ModelRecord
 
@@ -67,10 +68,8 @@ def list_models(
             active |= {found.id for found in store.models.active_of_each_hand(*pair)}
         except StoreDamaged as error:
             warn(response, str(error))
-    return [
-        model_row(record, record.id in active, store.models.damage(record) if record.id in active else "")
-        for record in records
-    ]
+    damaged = store.damages.of_models([record.id for record in records])
+    return [model_row(record, record.id in active, damaged.get(record.id, "")) for record in records]
 
 
 @router.post(
@@ -89,6 +88,7 @@ def roll_back(body: Which, store: StoreNeeded) -> Activation:
 def get_model(id: ModelInPath, parts: PartsNeeded) -> ModelInFull:
     record = parts.store.models.get(id)
     if damage := parts.store.models.damage(record):
+        parts.store.damages.note(tables.models.name, record.id, damage, record.subject)
         raise DamagedArtifact(damage)
     model, _ = parts.predictors.get(record.id)
     return model_in_full(record, parts.store.models.is_active(record), model)
