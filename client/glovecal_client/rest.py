@@ -17,13 +17,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import parse_qsl, quote, urlsplit
 
 import numpy as np
 
 from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import BadName, ClientError, ServiceError, reason_of
 from glovecal_client.installation import not_installed
+from glovecal_client.list_part import TOTAL, ListPart
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_client.private_files import open_private
 from glovecal_client.site.certificates import client_context
@@ -110,13 +111,19 @@ class RestClient:
 
     def get(self, path: str, query: Mapping[str, Any] | None = None) -> Any:
         """What is None in ``query`` is not asked for. Lists come whole, unless ``query`` has a ``limit``."""
-        given = {name: value for name, value in (query or {}).items() if value is not None}
-        response = self._send("GET", path, params=given or None)
+        response = self._asked(path, query)
         found = response.json() if response.content else None
-        while "limit" not in given and "next" in response.links:
+        while "limit" not in (query or {}) and "next" in response.links:
             response = self._send("GET", path + response.links["next"]["url"])
             found += response.json()
         return found
+
+    def part(self, path: str, query: Mapping[str, Any] | None = None) -> ListPart:
+        """One part of a list: ``limit`` rows, after the place ``after`` (None: from the beginning)."""
+        response = self._asked(path, query)
+        total = response.headers.get(TOTAL)
+        following = dict(parse_qsl(urlsplit(response.links.get("next", {}).get("url", "")).query))
+        return ListPart(response.json(), following.get("after"), None if total is None else int(total))
 
     def post(self, path: str, body: Any = None) -> Any:
         return self._json("POST", path, json=body)
@@ -293,6 +300,10 @@ class RestClient:
         kind = media_type or (PARQUET if file.suffix.lower() == ".parquet" else CSV)
         with open_kept(file) as stream:
             return self._json(method, path, params=query, content=stream, headers={"Content-Type": kind})
+
+    def _asked(self, path: str, query: Mapping[str, Any] | None) -> httpx.Response:
+        given = {name: value for name, value in (query or {}).items() if value is not None}
+        return self._send("GET", path, params=given or None)
 
     def _json(self, method: str, path: str, **request: Any) -> Any:
         response = self._send(method, path, **request)

@@ -17,8 +17,6 @@ from glovecal_client.errors import ClientError
 from glovecal_models.errors import reason_of as reason_of_models
 
 LONGEST_TEXT = 2000
-TOTAL = "X-Total-Count"
-"""Header of a list that is answered in parts: how many rows there are in all."""
 MOST_TRIES = 100
 Found = TypeVar("Found")
 _adapters: dict[Any, TypeAdapter[Any]] = {}

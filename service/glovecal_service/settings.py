@@ -84,6 +84,8 @@ class Settings(BaseSettings):
     upload_limit_mb: Annotated[int, Field(ge=1)] = 256
     keep_days: Annotated[float, Field(gt=0, le=36500)] = 90.0
     """How long uploads that no take came from, films and ledgers of recordings that became takes are kept."""
+    keep_jobs_days: Annotated[float, Field(gt=0, le=36500)] = 730.0
+    """How long jobs that are over are kept with their results, but the newest of each kind and subject."""
 
     @field_validator("site_file", "oidc_secret_file", mode="before")
     @classmethod

@@ -1,7 +1,8 @@
 """A store as a site has it after years: 100,000 models, 50,000 takes and 100,000 jobs of 10,000 people.
 
 Rows carry their hashes and every artifact that they name is there, as short as it can be: of the newest
-models it is a whole one, of the others a few bytes, and all takes share one. Only so can it be made in a minute.
+models it is a whole one, of the others a few bytes, and all takes share one. Only so can it be made
+in a minute.
 """
 
 from __future__ import annotations

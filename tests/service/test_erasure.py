@@ -21,6 +21,7 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store, tables
 from glovecal_service.store.erasure import erase, finish_erasures
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.list_part import ListPart
 
 KILLED_AT = {
     "the transaction": ("audit_trail", "_append", 0),
@@ -146,7 +147,7 @@ def test_nothing_is_left_of_who_was_erased_and_others_keep_theirs(
 
     assert store.audit.problems() == []
     assert store.audit.count == before + 1
-    (newest,) = store.audit.list(limit=1)
+    (newest,) = store.audit.page(ListPart(limit=1)).records
     proof = newest.changes[0]
     assert proof["key"] == f"erased-{erasure.id}"
     assert proof["after"]["removed"]["takes"] == 4

@@ -14,6 +14,7 @@ from glovecal_service.settings import Settings
 from glovecal_service.store import Store, migrate, schema, tables
 from glovecal_service.store.database import Database
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.list_part import ListPart
 from glovecal_service.store.passwords import NOBODYS, is_password, password_hash
 
 PASSWORD = "correct horse battery"
@@ -93,10 +94,10 @@ def test_what_is_changed_of_somebody_ends_their_sessions(store: Store) -> None:
 def test_the_log_of_changes_says_that_a_password_changed_and_holds_none(store: Store) -> None:
     store.people.create("anna", "viewer", password=PASSWORD)
     store.people.set_password("anna", PASSWORD + "!")
-    newest = store.audit.list(limit=1)[0]
+    newest = store.audit.page(ListPart(limit=1)).records[0]
     assert newest.changes[0]["key"] == "anna"
     assert list(newest.changes[0]["after"]) == ["password_changed_at"]
-    assert "argon2" not in str([entry.changes for entry in store.audit.list(limit=10)])
+    assert "argon2" not in str([entry.changes for entry in store.audit.page(ListPart(limit=10)).records])
     assert store.audit.problems() == []
 
 

@@ -5,21 +5,26 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from filled_store import META
+from sqlalchemy import text
 from stored_takes import LAYOUT, make_take
 
 from glovecal_client import Frame, FrameLog, encode_frame
 from glovecal_client.encryption.kept_file import open_kept
 from glovecal_service.filming import Filming
 from glovecal_service.settings import Settings
-from glovecal_service.store import Store
-from glovecal_service.store.errors import StorageFull
+from glovecal_service.store import Store, tables
+from glovecal_service.store.database import now
+from glovecal_service.store.errors import NotFound, StorageFull
+from glovecal_service.store.list_part import ListPart
 from glovecal_service.store.retention import sweep
+from glovecal_service.store.row_hash import change_rows
 
 
 def old(file: Path, days: float) -> Path:
@@ -64,6 +69,40 @@ def test_old_files_go_and_what_a_take_came_from_stays(store: Store, store_settin
     assert [file.exists() for file in gone] == [False] * 3
     assert [file.exists() for file in kept] == [True] * 6
     assert len(store.takes.load(store.takes.list()[0].id).time_s) == 300
+
+
+def test_old_jobs_go_with_their_results_and_the_newest_answers_stay(
+    store: Store, store_settings: Settings
+) -> None:
+    settings = store_settings.model_copy(update={"keep_jobs_days": 10.0})
+    for subject in ("anna", "ben"):
+        store.subjects.create(subject)
+
+    def done(kind: str, subject: str, days: float, *, is_done: bool = True) -> str:
+        job = store.jobs.create(kind, {}, subject=subject)
+        assert store.jobs.claim("worker") is not None
+        ended = store.jobs.finish(job.id, 1, {}) if is_done else store.jobs.fail(job.id, 1, "no")
+        at = now() - timedelta(days=days)
+        with store.database.write() as connection:
+            change_rows(connection, tables.jobs, tables.jobs.c.id == ended.id, {"finished_at": at})
+        return job.id
+
+    gone = [done("train", "anna", 20), done("train", "anna", 15), done("train", "anna", 14, is_done=False)]
+    kept = [done("train", "anna", 13), done("diagnose", "anna", 900), done("train", "ben", 900)]
+    damaged = done("train", "anna", 19)
+    kept.append(store.jobs.create("train", {}, subject="anna").id)
+    with store.database.write() as connection:
+        connection.execute(text("UPDATE jobs SET sentence = 'other' WHERE id = :id"), {"id": damaged})
+    swept = sweep(store, settings)
+    assert swept.jobs == 3
+    assert str(swept).endswith("steps of jobs that are over, 3 jobs with their results")
+    page = store.jobs.page(ListPart(limit=20))
+    assert {job.id for job in page.records} == set(kept)
+    assert len(page.damaged) == 1
+    for id in gone:
+        with pytest.raises(NotFound):
+            store.jobs.events(id)
+    assert sweep(store, settings).jobs == 0
 
 
 def test_nothing_is_filmed_onto_a_disk_that_is_nearly_full(

@@ -110,3 +110,26 @@ def test_what_is_known_of_a_person_goes_with_the_person(store: Store, store_sett
     store.damages.note("models", "abd", "model abd of ben is damaged", "ben")
     erase(store, store_settings, "anna")
     assert known(store) == [("models", "abd")]
+
+
+def test_a_row_that_an_index_does_not_find_is_told(sqlite_settings: Settings) -> None:
+    """A list would leave it out without a word."""
+    with Store.open(sqlite_settings) as store:
+        fill(store)
+        with store.database.engine.begin() as connection:
+            connection.exec_driver_sql("PRAGMA writable_schema = ON")
+            connection.exec_driver_sql(
+                "UPDATE sqlite_master SET sql = sql || ' WHERE subject <> ''anna''' "
+                "WHERE name = 'ix_takes_subject_created_at_id'"
+            )
+    with Store.open(sqlite_settings) as store, store.database.engine.begin() as connection:
+        connection.exec_driver_sql("REINDEX ix_takes_subject_created_at_id")
+        connection.exec_driver_sql("PRAGMA writable_schema = ON")
+        connection.exec_driver_sql(
+            "UPDATE sqlite_master SET sql = substr(sql, 1, instr(sql, ' WHERE') - 1) "
+            "WHERE name = 'ix_takes_subject_created_at_id'"
+        )
+    with Store.open(sqlite_settings) as store:
+        assert searched(store)[0].sentence.startswith(
+            "table takes or its index is damaged (row 1 missing from index "
+        )

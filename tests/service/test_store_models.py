@@ -47,11 +47,15 @@ def test_models_are_found_by_their_words(anna):
         ("creep", [monday, other]), (other.id[:9], [other]), (other.id[1:9], []), ("linear daumen x", []),
         ("", [monday, other]), ("_", []), ("\\", []), ("'", []),
     ):  # fmt: skip
-        part = ListPart(text=words)
+        part = ListPart(limit=10, text=words)
         assert anna.models.list(part=part) == found, words
-        assert anna.models.count(part=part) == len(found)
+        page = anna.models.page(part)
+        assert (page.records, page.total) == (found, len(found)), words
     assert anna.models.list(removed=True) == [gone]
-    assert anna.models.list(part=ListPart(limit=1, offset=1, reverse=True)) == [monday]
+    newest = anna.models.page(ListPart(limit=1, reverse=True))
+    assert (newest.records, newest.total) == ([other], 2)
+    assert anna.models.page(ListPart(limit=1, after=newest.after or "", reverse=True)).records == [monday]
+    assert anna.models.page(ListPart(limit=9), removed=True).records == [gone]
 
 
 def test_the_same_model_again_is_the_same_record(anna):

@@ -116,7 +116,8 @@ def test_forty_of_forty_overwrites_of_rows_are_noticed(whole, tmp_path):
         file.write_bytes(content[:at] + new + content[at + length :])
         try:
             with Store.open(settings) as store:
-                read_all(store)
+                read_all(store)  # may read a column from an index, where it is what was written
+                noticed += [(number, one.sentence) for found in store.damages.search() for one in found][:1]
         except StoreDamaged as error:
             noticed.append((number, str(error)))
     assert len(noticed) == 40

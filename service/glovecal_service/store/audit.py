@@ -16,6 +16,7 @@ from sqlalchemy import select
 from glovecal_service.store import tables
 from glovecal_service.store.audit_trail import entry_sha256
 from glovecal_service.store.database import Database
+from glovecal_service.store.list_part import Listing, ListPart, Page
 
 REWRITTEN = "audit"
 """Table of a change that says: an erasure took a subject out of that entry, and this is its hash now."""
@@ -35,17 +36,17 @@ class AuditEntry:
     sha256: str
 
 
+_LISTING = Listing(tables.audit, ("id",), newest_first=True, searched=("who", "origin", "action"))
+
+
 class Audit:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def list(self, *, limit: int, before: int | None = None) -> list[AuditEntry]:
-        """Newest first; ``before``: entries older than this id."""
-        statement = select(tables.audit).order_by(tables.audit.c.id.desc()).limit(limit)
-        if before is not None:
-            statement = statement.where(tables.audit.c.id < before)
+    def page(self, part: ListPart) -> Page[AuditEntry]:
+        """A part of them, newest first."""
         with self._database.read() as connection:
-            return [_entry(row._mapping) for row in connection.execute(statement)]
+            return _LISTING.page(connection, _entry, part)
 
     def every(self, after: int = 0) -> Iterator[AuditEntry]:
         """Those with higher ids, oldest first, in parts."""

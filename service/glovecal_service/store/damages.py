@@ -29,6 +29,8 @@ PROTECTED = tuple(table for table in tables.metadata.sorted_tables if HASH in ta
 MOST_AGAIN = 1000
 """Damaged things that are looked at again between two searches."""
 LONGEST_KEY, LONGEST_SENTENCE = 200, 2000
+INDEX = "(index)"
+"""Stands for the key of a row: lists find rows by indices."""
 _PLAIN_KEY = re.compile(r"[0-9A-Za-z._/-]+")
 """Another one was overwritten: no row can be looked up by it."""
 
@@ -109,6 +111,10 @@ class Damages:
                         if self.note(table.name, id, sentence, subject):
                             found.append(Damage(table.name, id, sentence, now()))
                 yield found
+            if sentence := self._damaged_index(table):
+                met.add(INDEX)
+                if self.note(table.name, INDEX, sentence):
+                    yield [Damage(table.name, INDEX, sentence, now())]
             self._forget(table, lambda id, met=met: id not in met)
 
     def _parts(self, table: Table) -> Iterator[Sequence[Row[Any]]]:
@@ -129,6 +135,18 @@ class Damages:
                 rows = connection.execute(select(table).where(*after, place <= end)).all()
             last = end
             yield rows
+
+    def _damaged_index(self, table: Table) -> str:
+        """ "" where SQLite finds each row by each index of the table; a server looks after its own."""
+        if not self._database.is_sqlite:
+            return ""
+        with self._database.read() as connection:
+            problem = str(connection.exec_driver_sql(f"PRAGMA integrity_check({table.name})").scalar())
+        if problem == "ok":
+            return ""
+        return (
+            f"table {table.name} or an index of it is damaged ({problem}); restore a backup of the database"
+        )
 
     def _sentence(self, table: Table, row: Row[Any]) -> str:
         """ "" for what is sound."""

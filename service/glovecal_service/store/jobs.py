@@ -8,29 +8,36 @@ runs out puts the job back into the queue; after three such losses it has failed
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from typing import Any
 
-from sqlalchemy import Connection, Select, delete, func, insert, select
+from sqlalchemy import Connection, delete, exists, func, insert, select
 
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound, StoreDamaged
-from glovecal_service.store.list_part import WHOLE, ListPart
-from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
-from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
+from glovecal_service.store.list_part import WHOLE, Listing, ListPart, Page
+from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
+from glovecal_service.store.row_hash import add_row, change_rows, sort_out, sound_row, sound_rows
 
 LEASE_S = 30.0
 MOST_LOSSES = 3
+MOST_FORGOTTEN = 1000
+"""Jobs that are removed at once."""
 LONGEST_SENTENCE = 2000
 LONGEST_TRACEBACK = 8000
 """Characters; the innermost calls stand at its end."""
 _HIDDEN = ("lease_until", "losses")
-_SEARCHED = ("^id", "kind", "subject", "state", "error", "^payload.model", "payload.effect")
+_LISTING = Listing(
+    tables.jobs,
+    newest_first=True,
+    searched=("^id", "kind", "subject", "state", "error", "^payload.model", "payload.effect"),
+)
+UNFINISHED_JOB_STATES: tuple[JobState, ...] = ("queued", "running")
 
 
 class Jobs:
@@ -197,25 +204,60 @@ class Jobs:
         with self._database.write() as connection:
             return connection.execute(delete(steps).where(steps.c.job.in_(over))).rowcount
 
+    def forget(self, before: datetime) -> int:
+        """Remove jobs with their results that were over before that time, where a later one of their kind and
+        subject was done; how many. A damaged one stays, and is named."""
+        table, later = tables.jobs, tables.jobs.alias("later")
+        is_followed = exists().where(
+            later.c.subject.is_not_distinct_from(table.c.subject),
+            later.c.kind == table.c.kind,
+            later.c.state == "done",
+            later.c.finished_at > table.c.finished_at,
+        )
+        over = table.c.state.in_(FINISHED_JOB_STATES) & (table.c.finished_at < before)
+        statement = select(table).where(over, is_followed).order_by(table.c.finished_at).limit(MOST_FORGOTTEN)
+        with self._database.write() as connection:
+            jobs, _ = sort_out(table, connection.execute(statement), _record)
+            ids = [job.id for job in jobs]
+            connection.execute(delete(tables.job_events).where(tables.job_events.c.job.in_(ids)))
+            connection.execute(delete(table).where(table.c.id.in_(ids)))
+        return len(ids)
+
     def list(
         self, *, subject: str | None = None, only_unfinished: bool = False, part: ListPart = WHOLE
     ) -> list[JobRecord]:
         """Jobs, newest first."""
-        chosen = part.of(_chosen(subject, only_unfinished), tables.jobs, _SEARCHED, newest_first=True)
+        table = tables.jobs.c
+        chosen = _LISTING.every(
+            None if subject is None else table.subject == subject,
+            table.state.not_in(FINISHED_JOB_STATES) if only_unfinished else None,
+            part=part,
+        )
         with self._database.read() as connection:
             return sound_rows(connection, tables.jobs, chosen, _record)
 
-    def count(
-        self, *, subject: str | None = None, only_unfinished: bool = False, part: ListPart = WHOLE
-    ) -> int:
-        """How many of them hold the text of ``part``."""
+    def page(
+        self,
+        part: ListPart,
+        *,
+        subject: str | None = None,
+        states: Sequence[JobState] | None = None,
+        kind: str | None = None,
+    ) -> Page[JobRecord]:
+        """A part of them, newest first."""
+        table = tables.jobs.c
         with self._database.read() as connection:
-            return part.count(connection, _chosen(subject, only_unfinished), tables.jobs, _SEARCHED)
+            return _LISTING.page(
+                connection, _record, part,
+                None if subject is None else table.subject == subject,
+                None if states is None else table.state.in_(states),
+                None if kind is None else table.kind == kind,
+            )  # fmt: skip
 
     def unfinished(self) -> dict[str, int]:
         """How many jobs are in each state that is not final."""
         state = tables.jobs.c.state
-        statement = select(state, func.count()).where(state.not_in(FINISHED_JOB_STATES)).group_by(state)
+        statement = select(state, func.count()).where(state.in_(UNFINISHED_JOB_STATES)).group_by(state)
         with self._database.read() as connection:
             return {row[0]: row[1] for row in connection.execute(statement)}
 
@@ -251,13 +293,6 @@ class Jobs:
                     _noted(connection, id)
                     requeued += 1
         return requeued
-
-
-def _chosen(subject: str | None, only_unfinished: bool) -> Select[Any]:
-    table, every = tables.jobs, select(tables.jobs)
-    if subject is not None:
-        every = every.where(table.c.subject == subject)
-    return every.where(table.c.state.not_in(FINISHED_JOB_STATES)) if only_unfinished else every
 
 
 def _plain(sentence: str) -> str:

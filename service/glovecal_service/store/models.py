@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, String, cast, func, select
+from sqlalchemy import ColumnElement, CompoundSelect, Connection, func, select, union
+from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.sql.functions import FunctionElement
+from sqlalchemy.types import NullType
 
 from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_models.hand.rotations import Handedness, is_of_hand, known_hand
+from glovecal_models.hand.rotations import HANDS, Handedness, is_of_hand, known_hand
 from glovecal_models.names import check_identifier
 from glovecal_service.store import tables
 from glovecal_service.store.blobs import Artifacts
 from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
-from glovecal_service.store.list_part import WHOLE, ListPart
+from glovecal_service.store.list_part import WHOLE, Listing, ListPart, Page, is_of_hand_in
 from glovecal_service.store.records import NAME, NOTE, REMOVED, Activation, ModelRecord
-from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
+from glovecal_service.store.row_hash import add_row, change_rows, sort_out, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
 
 SHORTEST_PREFIX = 6
-_SEARCHED = ("^id", "subject", "layout", "method", "facts.name", "facts.note", "facts.effects")
+_LISTING = Listing(
+    tables.models,
+    searched=("^id", "subject", "layout", "method", "facts.name", "facts.note", "facts.effects"),
+)
 _PREFIX = re.compile(r"[0-9a-f]{6,64}\Z")
 
 
@@ -115,15 +121,42 @@ class Models:
         part: ListPart = WHOLE,
     ) -> list[ModelRecord]:
         """Models in the order they were added; with ``removed`` those that were taken out."""
-        chosen = part.of(_chosen(subject, removed), tables.models, _SEARCHED, newest_first=False)
+        is_removed = IsRemoved(tables.models.c.facts)
+        mine = None if subject is None else of_subject(tables.models, subject)
+        chosen = _LISTING.every(is_removed if removed else ~is_removed, mine, part=part)
         with self._database.read() as connection:
             wanted = {"subject": subject, "layout": layout}
             return sound_rows(connection, tables.models, chosen, _record, wanted)
 
-    def count(self, subject: str | None = None, *, removed: bool = False, part: ListPart = WHOLE) -> int:
-        """How many there are of a subject (None: of all) that hold the text of ``part``."""
+    def page(
+        self,
+        part: ListPart,
+        *,
+        subject: str | None = None,
+        layout: str | None = None,
+        hand: Handedness | None = None,
+        removed: bool = False,
+    ) -> Page[ModelRecord]:
+        """A part of them, oldest first; of one hand those too of which nobody said whose they are."""
+        own, is_removed = tables.models.c, IsRemoved(tables.models.c.facts)
         with self._database.read() as connection:
-            return part.count(connection, _chosen(subject, removed), tables.models, _SEARCHED)
+            return _LISTING.page(
+                connection, _record, part,
+                None if subject is None else own.subject == subject,
+                None if layout is None else own.layout == layout,
+                is_of_hand_in(own.hand, hand),
+                is_removed if removed else None,
+                hidden=None if removed else is_removed,
+            )  # fmt: skip
+
+    def count(self, subject: str | None = None) -> int:
+        """How many there are of a subject (None: of all) that were not removed."""
+        own = select(func.count()).select_from(tables.models)
+        if subject is not None:
+            own = own.where(tables.models.c.subject == subject)
+        with self._database.read() as connection:
+            removed = connection.scalar(own.where(IsRemoved(tables.models.c.facts))) or 0
+            return (connection.scalar(own) or 0) - removed
 
     def lineage(self, id: str) -> list[ModelRecord]:
         """The model, its parent, the parent's parent ... Raises NotFound."""
@@ -199,13 +232,22 @@ class Models:
         """Whether it speaks for its subject with its layout, be it for one hand."""
         return any(each.id == model.id for each in self.active_of_each_hand(model.subject, model.layout))
 
-    def all_active(self) -> list[ModelRecord]:
-        """The active models of each subject and layout. Raises StoreDamaged."""
+    def active_among(self, models: Iterable[ModelRecord]) -> tuple[set[str], list[str]]:
+        """Ids of those that are active, and a sentence on each activation that is damaged."""
+        models = list(models)
+        subjects = sorted({model.subject for model in models})
         table = tables.activations
-        statement = select(table.c.subject, table.c.layout).distinct()
         with self._database.read() as connection:
-            pairs = connection.execute(statement.order_by(table.c.subject, table.c.layout)).all()
-        return [record for pair in pairs for record in self.active_of_each_hand(*pair)]
+            newest = select(_active_activations(subjects).subquery().c.id)
+            found = connection.execute(select(table).where(table.c.id.in_(newest))).all()
+        activations, damaged = sort_out(table, found, _activation_record)
+        return {model.id for model in models} & {each.model for each in activations}, damaged
+
+    def count_active(self, subject: str | None = None) -> int:
+        """How many speak for a subject (None: for all), a layout and a hand."""
+        chosen = _active_activations(None if subject is None else [subject]).subquery()
+        with self._database.read() as connection:
+            return connection.scalar(select(func.count()).select_from(chosen)) or 0
 
     def damage(self, model: ModelRecord) -> str:
         """Why the model's artifact cannot be loaded, and what to do; "" while it is what was stored."""
@@ -262,10 +304,21 @@ def _effect_names(artifact: bytes) -> dict[str, list[str]]:
     return {"effects": [item["name"] for item in effects]} if effects else {}
 
 
-def _chosen(subject: str | None, removed: bool) -> Select[Any]:
-    is_removed = cast(tables.models.c.facts, String).contains(f'"{REMOVED}":')
-    every = select(tables.models).where(is_removed if removed else ~is_removed)
-    return every if subject is None else every.where(of_subject(tables.models, subject))
+class IsRemoved(FunctionElement[Any]):
+    """Whether people took it out, as the index of those says it; a Boolean would be compared with 1."""
+
+    type = NullType()
+    inherit_cache = True
+
+
+@compiles(IsRemoved)
+def _on_sqlite(element: IsRemoved, compiler: Any, **options: Any) -> str:
+    return f"({tables.IS_REMOVED['sqlite']})"
+
+
+@compiles(IsRemoved, "postgresql")
+def _on_postgresql(element: IsRemoved, compiler: Any, **options: Any) -> str:
+    return f"({tables.IS_REMOVED['postgresql']})"
 
 
 def _find(connection: Connection, id: str) -> ModelRecord | None:
@@ -322,6 +375,35 @@ def _concerns(subject: str) -> ColumnElement[bool]:
     """Activations that are the subject's, or were before a damage: of all layouts, and of its models."""
     own = select(tables.models.c.id).where(tables.models.c.subject == subject)
     return of_subject(tables.activations, subject) | tables.activations.c.model.in_(own)
+
+
+def _active_activations(subjects: Sequence[str] | None) -> CompoundSelect[Any]:
+    """Ids of what ``active_of_each_hand`` finds for each subject and layout, without reading a row."""
+    table, models = tables.activations, tables.models
+    newest = select(table.c.subject, table.c.layout, table.c.hand, func.max(table.c.id).label("id")).group_by(
+        table.c.subject, table.c.layout, table.c.hand
+    )
+    known = (
+        select(models.c.subject, models.c.layout, models.c.hand).where(models.c.hand.in_(HANDS)).distinct()
+    )
+    if subjects is not None:
+        newest = newest.where(table.c.subject.in_(subjects))
+        known = known.where(models.c.subject.in_(subjects))
+    newest, known = newest.subquery("newest"), known.subquery("known")
+    same = (newest.c.subject == known.c.subject) & (newest.c.layout == known.c.layout)
+    of_hand = newest.c.hand.is_(None) | (newest.c.hand == known.c.hand)
+    by_hand = (
+        select(func.max(newest.c.id).label("id"))
+        .join_from(known, newest, same & of_hand)
+        .group_by(known.c.subject, known.c.layout, known.c.hand)
+    )
+    of_both = (
+        select(func.max(newest.c.id).label("id"))
+        .join_from(newest, known, same, isouter=True)
+        .where(known.c.hand.is_(None))
+        .group_by(newest.c.subject, newest.c.layout)
+    )
+    return union(by_hand, of_both)
 
 
 def _newest(connection: Connection, subject: str) -> int | None:

@@ -21,6 +21,7 @@ from glovecal_models.names import check_identifier, did_you_mean
 from glovecal_service.store import tables
 from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.list_part import Listing, ListPart, Page
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
 
@@ -47,6 +48,9 @@ class Principal:
         return self.password_changed_at is not None or self.issuer is not None
 
 
+_LISTING = Listing(tables.keys, ("name",), searched=("name", "role"))
+
+
 class Principals:
     """Those of one kind."""
 
@@ -59,9 +63,13 @@ class Principals:
 
     def list(self) -> list[Principal]:
         """By name, those that were revoked among them."""
-        statement = select(tables.keys).where(self.own).order_by(tables.keys.c.name)
         with self._database.read() as connection:
-            return sound_rows(connection, tables.keys, statement, principal_of)
+            return sound_rows(connection, tables.keys, _LISTING.every(self.own), principal_of)
+
+    def page(self, part: ListPart) -> Page[Principal]:
+        """A part of them."""
+        with self._database.read() as connection:
+            return _LISTING.page(connection, principal_of, part, self.own)
 
     def revoke(self, name: str) -> Principal:
         """Opens nothing from the next request on. Raises NotFound."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, select
@@ -14,6 +14,7 @@ from glovecal_service.store import tables
 from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound, TakenOver
+from glovecal_service.store.list_part import Listing, ListPart, Page
 from glovecal_service.store.records import (
     OPEN_RECORDING_STATES,
     TIME_CODE,
@@ -24,6 +25,10 @@ from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sou
 from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
+_LISTING = Listing(
+    tables.recordings, ("requested_at", "id"), newest_first=True,
+    searched=("^id", "glove", "name", "subject", "wearing", "state"),
+)  # fmt: skip
 PRE_ROLL = "pre_roll"
 """Fact of a recording: how much of the time before it was asked for, and came."""
 PRE_ROLL_BEFORE = "lead_in"
@@ -190,11 +195,27 @@ class Recordings:
             wanted.append(table.c.state.in_(OPEN_RECORDING_STATES))
         return self._select(*wanted)
 
-    def _select(self, *wanted: ColumnElement[bool]) -> list[RecordingRecord]:
-        table = tables.recordings
-        statement = select(table).where(*wanted).order_by(table.c.requested_at.desc(), table.c.id)
+    def page(
+        self,
+        part: ListPart,
+        *,
+        glove: str | None = None,
+        subject: str | None = None,
+        states: Sequence[RecordingState] | None = None,
+    ) -> Page[RecordingRecord]:
+        """A part of them, newest first."""
+        table = tables.recordings.c
         with self._database.read() as connection:
-            return sound_rows(connection, table, statement, _record)
+            return _LISTING.page(
+                connection, _record, part,
+                None if glove is None else table.glove == glove,
+                None if subject is None else table.subject == subject,
+                None if states is None else table.state.in_(states),
+            )  # fmt: skip
+
+    def _select(self, *wanted: ColumnElement[bool]) -> list[RecordingRecord]:
+        with self._database.read() as connection:
+            return sound_rows(connection, tables.recordings, _LISTING.every(*wanted), _record)
 
 
 def with_pre_roll(facts: Mapping[str, Any]) -> dict[str, Any]:

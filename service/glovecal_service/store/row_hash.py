@@ -9,7 +9,7 @@ nullable column can be added later and the rows there are stay valid.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC
 from typing import Any, TypeVar
 
@@ -67,17 +67,28 @@ def sound_rows(
 
     Raises DamagedRows, which names each damaged row and holds the records of the others.
     """
+    records, damaged = sort_out(table, connection.execute(chosen), make, wanted)
+    if damaged:
+        raise DamagedRows(damaged, records)
+    return records
+
+
+def sort_out(
+    table: Table,
+    rows: Iterable[Row[Any]],
+    make: Callable[[dict[str, Any]], Record],
+    wanted: Mapping[str, Any] | None = None,
+) -> tuple[list[Record], list[str]]:
+    """Records of the sound rows, and a sentence on each of the others."""
     records, damaged = [], []
-    for row in connection.execute(chosen):
+    for row in rows:
         try:
             values = sound_row(table, row)
             if all(value is None or values[name] == value for name, value in (wanted or {}).items()):
                 records.append(make(values))
         except StoreDamaged as error:
             damaged.append(str(error))
-    if damaged:
-        raise DamagedRows(damaged, records)
-    return records
+    return records, damaged
 
 
 def sound_row(table: Table, row: Row[Any]) -> dict[str, Any]:

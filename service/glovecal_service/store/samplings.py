@@ -15,9 +15,14 @@ from glovecal_service.store import tables
 from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.list_part import Listing, ListPart, Page
 from glovecal_service.store.records import SamplingRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import require_subject
+
+_LISTING = Listing(
+    tables.samplings, newest_first=True, searched=("^id", "glove", "subject", "wearing", "layout")
+)
 
 
 class Samplings:
@@ -69,13 +74,24 @@ class Samplings:
     def list(self, *, glove: str | None = None, only_open: bool = False) -> list[SamplingRecord]:
         """Newest first."""
         table = tables.samplings
-        statement = select(table).order_by(table.c.created_at.desc(), table.c.id)
-        if glove is not None:
-            statement = statement.where(table.c.glove == glove)
-        if only_open:
-            statement = statement.where(table.c.open)
+        statement = _LISTING.every(
+            None if glove is None else table.c.glove == glove, table.c.open if only_open else None
+        )
         with self._database.read() as connection:
             return sound_rows(connection, table, statement, _record)
+
+    def page(
+        self, part: ListPart, *, glove: str | None = None, subject: str | None = None, only_open: bool = False
+    ) -> Page[SamplingRecord]:
+        """A part of them, newest first."""
+        table = tables.samplings.c
+        with self._database.read() as connection:
+            return _LISTING.page(
+                connection, _record, part,
+                None if glove is None else table.glove == glove,
+                None if subject is None else table.subject == subject,
+                table.open if only_open else None,
+            )  # fmt: skip
 
     def save(self, seen: SamplingRecord, document: Mapping[str, Any]) -> SamplingRecord | None:
         """Replace the document that ``seen`` has; None if somebody else did so meanwhile."""

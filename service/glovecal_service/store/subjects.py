@@ -17,9 +17,12 @@ from glovecal_service.store import tables
 from glovecal_service.store.changes import tell_change, tell_forgotten_subject
 from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import Conflict, NotFound
+from glovecal_service.store.list_part import Listing, ListPart, Page
 from glovecal_service.store.records import SubjectRecord
 from glovecal_service.store.row_hash import sound_row, sound_rows
 from glovecal_service.store.texts import check_text
+
+_LISTING = Listing(tables.subjects, ("name",), searched=("name", "title"))
 
 
 class Subjects:
@@ -57,8 +60,22 @@ class Subjects:
     def list(self) -> list[SubjectRecord]:
         """All subjects by name."""
         with self._database.read() as connection:
-            statement = select(tables.subjects).order_by(tables.subjects.c.name)
-            return sound_rows(connection, tables.subjects, statement, _record)
+            return sound_rows(connection, tables.subjects, _LISTING.every(), _record)
+
+    def page(self, part: ListPart) -> Page[SubjectRecord]:
+        """A part of them, by name."""
+        with self._database.read() as connection:
+            return _LISTING.page(connection, _record, part)
+
+    def names(self) -> set[str]:
+        """Of all."""
+        with self._database.read() as connection:
+            return set(connection.scalars(select(tables.subjects.c.name)))
+
+    def count(self) -> int:
+        """How many there are."""
+        with self._database.read() as connection:
+            return connection.scalar(select(func.count()).select_from(tables.subjects)) or 0
 
     def measure(
         self, name: str, dimensions: Mapping[str, float], hand: Handedness | None = None

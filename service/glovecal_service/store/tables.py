@@ -218,7 +218,7 @@ models = Table(
     Column("created_at", UtcTime, nullable=False),
     Column("hand", String(8)),
     Column("row_sha256", SHA256, nullable=False),
-    Index(None, "subject", "layout"),
+    Index(None, "subject", "layout", "hand"),
     Index(None, "created_at", "id"),
     Index(None, "subject", "created_at", "id"),
     Index(

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Select, delete, select
+from sqlalchemy import ColumnElement, Connection, bindparam, delete, func, select
 from sqlalchemy.exc import IntegrityError
 
 from glovecal_models.errors import BadInput
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.layout import Layout
 from glovecal_models.names import check_identifier
 from glovecal_models.takes.camera_reference import CAMERA_PATCHES
@@ -24,7 +25,7 @@ from glovecal_service.store.changes import tell_change
 from glovecal_service.store.database import Database, new_id, now
 from glovecal_service.store.errors import Conflict, NotFound, TakenOver
 from glovecal_service.store.gloves import latency_of_take
-from glovecal_service.store.list_part import WHOLE, ListPart
+from glovecal_service.store.list_part import WHOLE, Listing, ListPart, Page, TextIn, is_of_hand_in
 from glovecal_service.store.records import CLOCK_UNKNOWN, LEFT_OUT, NOTE, TIME_CODE, TakeRecord
 from glovecal_service.store.row_hash import add_row, change_rows, sound_row, sound_rows
 from glovecal_service.store.subjects import of_subject, require_subject
@@ -45,9 +46,12 @@ UNWRAPPED = "unwrapped"
 AS_SHOWN_S = 0.006
 """Ends of a stretch are shown with two digits, and taken so."""
 
-_SEARCHED = (
-    "^id", "name", "subject", "wearing", "layout", "source", "^original_sha256", "^facts.read_as.shape",
-    "facts.note",
+_LISTING = Listing(
+    tables.takes,
+    searched=(
+        "^id", "name", "subject", "wearing", "layout", "source", "^original_sha256", "^facts.read_as.shape",
+        "facts.note",
+    ),
 )  # fmt: skip
 
 
@@ -137,15 +141,41 @@ class Takes:
         self, subject: str | None = None, layout: str | None = None, part: ListPart = WHOLE
     ) -> list[TakeRecord]:
         """Takes in the order they were added."""
-        chosen = part.of(_chosen(subject), tables.takes, _SEARCHED, newest_first=False)
+        chosen = _LISTING.every(_of(subject), part=part)
         with self._database.read() as connection:
             wanted = {"subject": subject, "layout": layout}
             return sound_rows(connection, tables.takes, chosen, _record, wanted)
 
-    def count(self, subject: str | None = None, part: ListPart = WHOLE) -> int:
-        """How many there are of a subject (None: of all) that hold the text of ``part``."""
+    def page(
+        self,
+        part: ListPart,
+        *,
+        subject: str | None = None,
+        layout: str | None = None,
+        hand: Handedness | None = None,
+        among: Iterable[str] | None = None,
+    ) -> Page[TakeRecord]:
+        """A part of them, oldest first; of one hand those too of which nobody said whose they are. ``among``:
+        these ids only."""
+        own = tables.takes.c
+        ids = None if among is None else bindparam("among", list(among), expanding=True, literal_execute=True)
         with self._database.read() as connection:
-            return part.count(connection, _chosen(subject), tables.takes, _SEARCHED)
+            return _LISTING.page(
+                connection, _record, part,
+                None if subject is None else own.subject == subject,
+                None if layout is None else own.layout == layout,
+                is_of_hand_in(TextIn(own.accounting, "hand"), hand),
+                None if ids is None else own.id.in_(ids),
+            )  # fmt: skip
+
+    def count(self, subject: str | None = None) -> int:
+        """How many there are of a subject (None: of all)."""
+        own = select(func.count()).select_from(tables.takes)
+        with self._database.read() as connection:
+            return (
+                connection.scalar(own if subject is None else own.where(tables.takes.c.subject == subject))
+                or 0
+            )
 
     def load(self, id: str) -> Take:
         """The take as it is worked with: ``load_recorded`` without what people left out, and without angles
@@ -426,9 +456,8 @@ def _of_another_reference(record: TakeRecord) -> dict[str, Any]:
     return {name: unknown[name] for name in unknown if name in record.facts}
 
 
-def _chosen(subject: str | None) -> Select[Any]:
-    every = select(tables.takes)
-    return every if subject is None else every.where(of_subject(tables.takes, subject))
+def _of(subject: str | None) -> ColumnElement[bool] | None:
+    return None if subject is None else of_subject(tables.takes, subject)
 
 
 def _require(connection: Connection, id: str) -> TakeRecord:

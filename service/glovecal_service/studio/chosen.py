@@ -11,9 +11,9 @@ from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
 from glovecal_service.rest.model.answer import Model
-from glovecal_service.rest.subject.answer import Subject
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.amounts import version_name
+from glovecal_service.studio.person_choice import People
 from glovecal_service.studio.service import Refusal, Service
 
 MOST_OFFERED = 200
@@ -22,7 +22,7 @@ MOST_OFFERED = 200
 
 @dataclass(frozen=True)
 class Chosen:
-    people: tuple[str, ...]
+    people: People
     person: str
     """"" where nobody is known."""
     models: tuple[Model, ...]
@@ -47,7 +47,7 @@ class Chosen:
         """The same page about somebody who may have been added on it; models are asked for on other pages."""
         if person == self.person:
             return self
-        return Chosen(tuple(dict.fromkeys([*self.people, person])), person, (), None, "")
+        return Chosen(self.people.and_also(person), person, (), None, "")
 
     async def takes(self, service: Service) -> list[Take]:
         """The person's, the newest of them, in the order they were added."""
@@ -65,10 +65,8 @@ class Chosen:
         def other_model(event: ValueChangeEventArguments) -> None:
             ui.navigate.to(f"/{page}?model={event.value}")
 
-        if self.people:
-            ui.select(list(self.people), value=self.person, label="Person", on_change=other_person).props(
-                "dense"
-            ).classes("choice")
+        if self.people.names:
+            self.people.select("Person", self.person or None, other_person).props("dense")
         if about_models and self.model is not None:
             names = {each.id: version_name(each) for each in self.models}
             ui.select(names, value=self.model.id, label="Model", on_change=other_model).props(
@@ -81,7 +79,7 @@ async def chosen(service: Service) -> Chosen:
     (``id``), else its ``who``, else the wearer of the newest active model, a real hand's where there is one,
     else of the newest take."""
     query = ui.context.client.request.query_params
-    people = tuple(each.name for each in await service.read(list[Subject], "/subjects"))
+    people = await People.of(service)
     wanted = query.get("model") or query.get("models", "").partition(",")[0]
     person, notice, own = query.get("who", ""), "", None
     if wanted:
@@ -91,8 +89,9 @@ async def chosen(service: Service) -> Chosen:
     elif take := query.get("id"):
         with suppress(Refusal):  # the page says that there is none
             person = (await service.read(Take, f"/takes/{quote(take)}")).subject
-    if person not in people:
+    if not person or not await people.has(person):
         person = await _usual(service, people)
+    people = people.and_also(person)
     models: tuple[Model, ...] = ()
     if person:
         models = tuple(
@@ -120,11 +119,11 @@ def _active_or_newest(models: Sequence[Model]) -> Model | None:
     return next((each for each in models if each.active), next(iter(models), None))
 
 
-async def _usual(service: Service, people: tuple[str, ...]) -> str:
+async def _usual(service: Service, people: People) -> str:
     models = await service.read(list[Model], "/models", reverse=True, limit=MOST_OFFERED)
     takes = [] if models else await service.read(list[Take], "/takes", reverse=True, limit=1)
     real = [each for each in models if not each.facts.get("simulated")]
     latest = _active_or_newest(real or models) or next(iter(takes), None)
     if latest is not None:
         return latest.subject
-    return people[-1] if people else ""
+    return people.names[-1] if people.names else ""

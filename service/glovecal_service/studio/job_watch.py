@@ -8,6 +8,7 @@ from nicegui import ui
 
 from glovecal_service.rest.job.answer import Job
 from glovecal_service.studio.heading import quiet_act
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.studio import Studio
 
@@ -34,7 +35,7 @@ class JobWatch:
             self._bar = ui.linear_progress(0.0, show_value=False).props('aria-label="progress"')
             quiet_act("Cancel", self._cancel)
         self._row.set_visibility(False)
-        self._timer = ui.timer(EVERY_S, self._look, active=False)
+        self._timer = again(EVERY_S, self._look, active=False)
 
     def follow(self, job: str) -> None:
         self._job = job

@@ -14,6 +14,7 @@ from glovecal_client.errors import ClientError
 from glovecal_service.studio.finger_test import ANSWERS_FROM, Answered, FingerTest
 from glovecal_service.studio.heading import main_act
 from glovecal_service.studio.live_feed import GloveFeed
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import cell, row_head, table
 
@@ -48,7 +49,7 @@ class LiveTest:
         self._instruction = ui.label("").classes("finding-sentence").props('role="status"')
         self._table = ui.element("div")
         ui.context.client.on_delete(self._release)
-        ui.timer(LOOK_S, self._look)
+        again(LOOK_S, self._look)
 
     async def _look(self) -> None:
         if self._looks % LOOKS_SHOWN == 0:

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from nicegui import ui
 
 from glovecal_service.studio.heading import quiet_act
-from glovecal_service.studio.service import Service, refusals
+from glovecal_service.studio.service import Part, Service, refusals
 
 Row = TypeVar("Row")
 TYPED_MS = 300
@@ -33,7 +33,10 @@ class PagedList(Generic[Row]):
         self._service, self._kind, self._path = service, kind, path
         self._show, self._what, self._at_once = show, what, at_once
         self._key = key
-        self._offset, self._text = 0, ""
+        self._text = ""
+        self._turned: list[str] = []
+        """Where each part began that was turned to, the one that is shown last."""
+        self._next: str | None = None
         self._shown: object = None
 
     async def build(self) -> None:
@@ -41,45 +44,54 @@ class PagedList(Generic[Row]):
             field = ui.input(f"Filter {self._what}", on_change=lambda event: self._filter(event.value or ""))
             field.props(f"dense clearable debounce={TYPED_MS} maxlength=200").classes("list-filter")
             self._count = ui.label("").props('role="status"')
-            self._newer = quiet_act("Newer", lambda: self._turn(-self._at_once))
-            self._older = quiet_act("Older", lambda: self._turn(self._at_once))
+            self._newer = quiet_act("Newer", self._turn_back)
+            self._older = quiet_act("Older", self._turn_on)
         self._place = ui.element("div")
         await self.look()
 
     async def look(self) -> bool:
         """Draw what is there now, where that is something else; whether there is anything."""
-        asked = (self._offset, self._text)
-        rows, total = await self._service.part(
+        asked = (*self._turned, self._text)
+        part = await self._service.part(
             self._kind, self._path, reverse=self._path != "/jobs", limit=self._at_once,
-            offset=self._offset, text=self._text,
+            after=self._turned[-1] if self._turned else None, text=self._text,
         )  # fmt: skip
-        if asked != (self._offset, self._text):  # turned or typed meanwhile, which looks by itself
+        if asked != (*self._turned, self._text):  # turned or typed meanwhile, which looks by itself
             return True
-        now = (asked, total, [self._key(row) for row in rows])
+        now = (asked, part.total, part.after, [self._key(row) for row in part.rows])
         if now != self._shown:
-            self._shown = now
-            self._tell(len(rows), total)
+            self._shown, self._next = now, part.after
+            self._tell(part)
             self._place.clear()
             with self._place:
-                await self._show(rows)
-        return bool(rows)
+                await self._show(part.rows)
+        return bool(part.rows)
 
-    def _tell(self, rows: int, total: int) -> None:
-        first = self._offset + 1
-        some = f"{first:,} to {self._offset + rows:,} of {total:,}" if rows else f"none of {total:,}"
-        self._count.set_text(some if total > self._at_once or not rows else f"{rows}")
-        for button, is_there in (
-            (self._newer, self._offset > 0),
-            (self._older, self._offset + self._at_once < total),
-        ):
-            button.set_visibility(is_there)
+    def _tell(self, part: Part[Row]) -> None:
+        count = len(part.rows)
+        first = self._at_once * len(self._turned) + 1
+        of_all = "" if part.total is None else f" of {part.total:,}"
+        some = f"{first:,} to {first + count - 1:,}{of_all}" if count else f"none{of_all}"
+        is_whole = part.after is None and not self._turned
+        self._count.set_text(f"{count}" if is_whole and count else some)
+        self._newer.set_visibility(bool(self._turned))
+        self._older.set_visibility(part.after is not None)
 
-    async def _turn(self, by: int) -> None:
-        self._offset = max(0, self._offset + by)
-        with refusals():
-            await self.look()
+    async def _turn_on(self) -> None:
+        if self._next is not None:
+            self._turned.append(self._next)
+            await self._look_anew()
+
+    async def _turn_back(self) -> None:
+        if self._turned:
+            self._turned.pop()
+            await self._look_anew()
 
     async def _filter(self, text: str) -> None:
-        self._text, self._offset = text.strip(), 0
+        self._text = text.strip()
+        self._turned.clear()
+        await self._look_anew()
+
+    async def _look_anew(self) -> None:
         with refusals():
             await self.look()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 from starlette.concurrency import run_in_threadpool
 
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 0.5
@@ -17,7 +18,7 @@ class ServedLabel:
         """``what``: the model's part of the sentence, such as "Trained"."""
         self._studio, self._glove, self._model, self._what = studio, glove, model, what
         self._label = ui.label(f"{what}.").props('role="status"')
-        self._timer = ui.timer(EVERY_S, self._look)
+        self._timer = again(EVERY_S, self._look)
 
     async def _look(self) -> None:
         state = (await run_in_threadpool(self._studio.feeds.states)).get(self._glove)

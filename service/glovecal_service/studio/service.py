@@ -9,18 +9,21 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any, Generic, TypeVar
+from weakref import WeakKeyDictionary, WeakSet
 
 import httpx
 from fastapi import FastAPI
-from nicegui import context, ui
+from nicegui import Client, context, ui
 from nicegui.slot import Slot
 
-from glovecal_service.plain import TOTAL, read
+from glovecal_client.list_part import TOTAL
+from glovecal_service.plain import read
 from glovecal_service.rest.http.observation import SESSION_COOKIE, STUDIO
 
 PATIENCE_S = 300.0
+UNKNOWN = 401
+"""Status of a request of whom nobody knows who asks."""
 Found = TypeVar("Found")
 _BROWSERS: WeakKeyDictionary[Slot, _Browser] = WeakKeyDictionary()
 """Of the parts of pages that asked for something: a part may clear itself and go on asking."""
@@ -44,7 +47,8 @@ def refusals(tell: Callable[[str], object] = warn) -> Iterator[None]:
     try:
         yield
     except Refusal as refusal:
-        tell(str(refusal))
+        if not is_session_over():
+            tell(str(refusal))
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,35 @@ def has_session() -> bool:
     return _Browser.here().session is not None
 
 
+_WITHOUT_SESSION: WeakSet[Client] = WeakSet()
+"""Pages that have said it."""
+LOG_IN = '() => location.assign("../login?page=" + encodeURIComponent(location.pathname + location.search))'
+
+
+def is_session_over() -> bool:
+    """Whether this page's service answers nobody any more: the page says so."""
+    return _client() in _WITHOUT_SESSION
+
+
+def _say_that_session_is_over() -> None:
+    client = _client()
+    if client is None or client in _WITHOUT_SESSION:
+        return
+    _WITHOUT_SESSION.add(client)
+    with client, ui.dialog(value=True).props('persistent aria-label="Session over"'), ui.card():
+        ui.label("Your session has ended. Log in to go on; what is not saved on this page is lost.")
+        log_in = ui.button("Log in").props("unelevated no-caps color=indigo-8")
+        log_in.on("click", js_handler=LOG_IN)  # the page reaches the service no more
+
+
+def _client() -> Client | None:
+    """None in a part of a page that was cleared, and outside pages."""
+    try:
+        return context.client if context.slot_stack else None
+    except RuntimeError:
+        return None
+
+
 _ORIGIN = "origin"
 
 
@@ -94,6 +127,15 @@ class _InProcess(httpx.AsyncBaseTransport):
         return await transport.handle_async_request(request)
 
 
+@dataclass(frozen=True)
+class Part(Generic[Found]):
+    rows: list[Found]
+    after: str | None
+    """Where the next part begins; None: there is none."""
+    total: int | None
+    """Rows of all parts; None: they were not counted."""
+
+
 class Service:
     """Paths are below ``/v1``: ``await service.get("/takes", subject="anna")``; answers are plain data."""
 
@@ -105,10 +147,21 @@ class Service:
     async def get(self, path: str, **query: Any) -> Any:
         return await self._ask("GET", path, query)
 
-    async def part(self, answer: type[Found], path: str, **query: Any) -> tuple[list[Found], int]:
-        """Rows of a list, and how many there are in all."""
+    async def part(self, answer: type[Found], path: str, **query: Any) -> Part[Found]:
+        """Rows of a list: ``limit`` of them, after the place ``after``."""
         found = await self._answer("GET", path, query)
-        return read(list[answer], found.json()), int(found.headers[TOTAL])
+        following = httpx.URL(found.links.get("next", {}).get("url", "")).params.get("after")
+        total = found.headers.get(TOTAL)
+        return Part(read(list[answer], found.json()), following, None if total is None else int(total))
+
+    async def every(self, answer: type[Found], path: str, **query: Any) -> list[Found]:
+        """All rows of a list that is not long: of one person, or of what is going on."""
+        part = await self.part(answer, path, **query)
+        rows = part.rows
+        while part.after is not None:
+            part = await self.part(answer, path, **query, after=part.after)
+            rows += part.rows
+        return rows
 
     async def read(self, answer: type[Found], path: str, **query: Any) -> Found:
         """What ``get`` answers, as what it is."""
@@ -167,4 +220,6 @@ class Service:
         sentence = str(
             problem.get("detail") or problem.get("title") or f"The service answered {answer.status_code}."
         )
+        if answer.status_code == UNKNOWN and browser.session:
+            _say_that_session_is_over()
         raise Refusal(answer.status_code, sentence)

@@ -11,13 +11,14 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.job.answer import JobRow
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.chosen import Chosen, chosen
 from glovecal_service.studio.drop import DropZone
 from glovecal_service.studio.heading import heading, quiet_act
 from glovecal_service.studio.next_steps import NextStepLine, next_steps
-from glovecal_service.studio.service import Refusal, Service, has_session, refusals
+from glovecal_service.studio.repeating import again
+from glovecal_service.studio.service import Service, has_session, refusals
 from glovecal_service.studio.studio import Studio
 
 NAVIGATION = (
@@ -146,18 +147,14 @@ PAGES = {"diagnose": ("diagnose?model=", "What it found"), "ceiling": ("compare?
 """Where a job's model is shown with its result; of other kinds its errors are."""
 
 
-def result_link(job: Job) -> tuple[str, str] | None:
+def result_link(job: JobRow) -> tuple[str, str] | None:
     """Name and address of the page that shows what a finished job found; None where there is none."""
-    result = job.result
-    if not result:
-        return None
-    if job.kind in WITH_REPORTS:
+    if job.has_result and job.kind in WITH_REPORTS:
         return "Report", f"../v1/jobs/{job.id}/report"
-    model = result.get("model")
-    if not model:
+    if not job.model:
         return None
     page, name = PAGES.get(job.kind, ("fall?model=", "Its errors"))
-    return name, f"/{page}{quote(str(model))}"
+    return name, f"/{page}{quote(job.model)}"
 
 
 class JobsDrawer:
@@ -182,18 +179,15 @@ class JobsDrawer:
 
     def start(self, ended: Callable[[], Awaitable[None]]) -> None:
         """``ended`` is called after jobs have ended."""
-        ui.timer(EVERY_S, partial(self._look, ended))
+        again(EVERY_S, partial(self._look, ended))
 
     async def _look(self, ended: Callable[[], Awaitable[None]]) -> None:
         service = self._studio.service
-        try:
-            running = await service.read(list[Job], "/jobs", only_unfinished=True)
-            now = {job.id: (job.state, job.fraction, job.sentence) for job in running}
-            if now == self._running:
-                return
-            jobs = await service.read(list[Job], "/jobs", limit=SHOWN)
-        except Refusal:
+        running = await service.read(list[JobRow], "/jobs", only_unfinished=True)
+        now = {job.id: (job.state, job.fraction, job.sentence) for job in running}
+        if now == self._running:
             return
+        jobs = await service.read(list[JobRow], "/jobs", limit=SHOWN)
         self._button.set_text(f"Jobs ({len(now)} running)" if now else "Jobs")
         for job in jobs:
             if self._running is not None and job.id in self._running and job.id not in now:
@@ -208,7 +202,7 @@ class JobsDrawer:
             if not jobs:
                 ui.label("No job yet.")
 
-    def _row(self, job: Job) -> None:
+    def _row(self, job: JobRow) -> None:
         with ui.element("section").classes("job"):
             about = f" of {job.subject}" if job.subject else ""
             ui.label(f"{job.kind}{about}: {job.state}").classes("job-kind")

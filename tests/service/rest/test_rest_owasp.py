@@ -125,7 +125,7 @@ def test_api8_a_failure_inside_is_logged_not_shown(
     def fail(*_: Any) -> None:
         raise RuntimeError("the secret inside")
 
-    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.list", fail)
+    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.page", fail)
     caplog.set_level(logging.INFO, "glovecal.rest")
     with pytest.raises(Refused) as refused:
         shared.get("/subjects")
@@ -186,7 +186,7 @@ def test_ready_says_what_does_not_work(shared: RestClient, monkeypatch: pytest.M
     def damaged(*_: Any) -> None:
         raise StoreDamaged("the database file is damaged; restore a backup")
 
-    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.list", damaged)
+    monkeypatch.setattr("glovecal_service.store.database.Revision.__call__", damaged)
     with pytest.raises(Refused, match="damaged") as refused:
         shared.get("/health/ready")
     assert refused.value.status == 503

@@ -262,7 +262,7 @@ def test_refusals_are_what_the_model_says(shared: RestClient, monkeypatch: pytes
     def refuse(*_: Any, **__: Any) -> None:
         raise BadInput("the reason \ud800 with a lone surrogate")
 
-    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.list", refuse)
+    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.page", refuse)
     with pytest.raises(Refused, match="the reason") as refused:
         shared.get("/subjects")
     assert refused.value.status == 422

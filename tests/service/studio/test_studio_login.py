@@ -182,8 +182,10 @@ def test_who_proves_at_a_provider_who_they_are_comes_back_to_the_page(
         expect(dialog.get_by_label("New password")).to_be_hidden()
         dialog.get_by_role("button", name="Cancel").click()
         page.get_by_role("button", name="Remove anna").click()
-        expect(page.get_by_text("This service asks who you are").first).to_be_visible()
-        page.goto(f"{address}/studio/access")
+        over = page.get_by_role("dialog", name="Session over")
+        expect(over).to_contain_text("Your session has ended. Log in to go on")
+        over.get_by_role("button", name="Log in").click()
+        expect(page).to_have_url(f"{address}/login?page=%2Fstudio%2Faccess")
         page.get_by_role("link", name="Log in with Our Company").click()
         page.get_by_role("button", name="s-1").click()
         expect(page.get_by_role("alert")).to_contain_text("anna was removed by an admin")
@@ -221,3 +223,38 @@ def test_an_admin_adds_changes_and_removes_people(opened: Open) -> None:
     expect(page.get_by_role("button", name="Remove carla")).to_have_count(0)
     expect(page.get_by_role("cell", name="keys carla").first).to_be_visible()
     assert seen.complaints == []
+
+
+def test_pages_left_open_after_their_session_say_so_once_and_lead_to_the_login(
+    browser: Browser, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Those that look again and again: none of them leaves a traceback in the log."""
+    port = int(free_endpoint().rpartition(":")[2])
+    settings = Settings(data=tmp_path / "data", zenoh=free_endpoint(), port=port, workers=1, login="always")
+    address = f"http://127.0.0.1:{port}"
+    with Store.open(settings) as store, part_of_service(web, settings):
+        store_model(store, "anna", degrees_per_count=0.5)
+        _, key = store.keys.create("training", "trainer")
+        context = browser.new_context(viewport={"width": 390, "height": 844})
+        context.set_default_timeout(PATIENCE_MS)
+        page = context.new_page()
+        page.goto(f"{address}/login?page=/studio/models")
+        page.get_by_label("Your key").fill(key)
+        page.get_by_role("button", name="Log in with a key").click()
+        expect(page).to_have_url(f"{address}/studio/models")
+        pages = {"models": page} | {name: context.new_page() for name in ("jobs", "start", "fall", "capture")}
+        for name, one in pages.items():
+            if name != "models":
+                one.goto(f"{address}/studio/{name}")
+            expect(one.get_by_role("button", name="Log out")).to_be_visible()
+        store.keys.revoke("training")
+        for one in pages.values():
+            over = one.get_by_role("dialog", name="Session over")
+            expect(over).to_have_count(1)
+            expect(over).to_contain_text("Your session has ended. Log in to go on")
+            assert serious(one) == []
+        for name, one in pages.items():
+            one.get_by_role("dialog", name="Session over").get_by_role("button", name="Log in").click()
+            expect(one).to_have_url(f"{address}/login?page=%2Fstudio%2F{name}")
+        context.close()
+    assert "Traceback" not in capfd.readouterr().err

@@ -9,13 +9,20 @@ from typing import Annotated, Any
 import typer
 
 from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Wanted,
+    Words,
+    filtered,
+)
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import (
     Overwrite,
     Refusal,
     out,
     print_table,
-    read_or_print,
     require_place,
     write_whole,
 )
@@ -23,17 +30,20 @@ from glovecal_service.plain import read
 from glovecal_service.rest.access.answer import AuditCheck, AuditRow
 
 app = typer.Typer(help="The log of changes: who changed what, when, from where.", no_args_is_help=True)
-PART = 1000
 
 
 @app.command("list")
 def list_audit(
-    limit: Annotated[int, typer.Option(min=1, max=1000, help="The newest so many.")] = 30,
+    text: Words = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
     as_json: AsJson = False,
 ) -> None:
     """List changes, newest first."""
+    wanted, query = Wanted(limit, every, after, as_json), {"text": text}
     with connect() as service:
-        rows = read_or_print(list[AuditRow], service.get("/audit", {"limit": limit}), as_json)
+        rows = wanted.rows(service, AuditRow, "/audit", filtered("audit list", **query), query)
     shown = [{**vars(row), "what": _what(row.changes)} for row in rows]
     columns = {
         "id": "no.",
@@ -63,12 +73,8 @@ def export(
 ) -> None:
     """Write the whole log."""
     require_place(file, overwrite=overwrite)
-    entries: list[dict[str, Any]] = []
     with connect() as service:
-        before = None
-        while part := service.get("/audit", {"limit": PART, "before": before}):
-            entries += part
-            before = part[-1]["id"]
+        entries = service.get("/audit")
     lines = [json.dumps(entry, sort_keys=True) for entry in reversed(entries)]
     write_whole({file: "".join(f"{line}\n" for line in lines).encode()})
 

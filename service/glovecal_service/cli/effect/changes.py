@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 import typer
 
-from glovecal_service.cli.take.rows import find_takes, stored_takes
+from glovecal_service.cli.take.rows import named_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model
 from glovecal_service.cli.terminal.presenting import present
@@ -48,7 +48,7 @@ def add_effect(
     """
     wanted: Any = effect if expression is None else {"declaration": _declaration_text(effect, expression)}
     with connect() as service:
-        rows = find_takes(stored_takes(service), take or [])
+        rows = named_takes(service, take or [])
         body: dict[str, Any] = {"effect": wanted, "rotations": rotation or None, "activate": activate}
         body |= {"takes": [row.id for row in rows] or None}
         job = begun_job(service.post(f"/models/{model}/effects", body))

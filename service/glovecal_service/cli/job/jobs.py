@@ -2,24 +2,48 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import AsJson, Job
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Since,
+    Wanted,
+    Words,
+    filtered,
+)
+from glovecal_service.cli.terminal.options import AsJson, Job, OnlySubject
 from glovecal_service.cli.terminal.printing import out, print_facts, print_json, print_table, read_or_print
 from glovecal_service.cli.terminal.waiting import wait_for_job
 from glovecal_service.plain import read
 from glovecal_service.rest.job.answer import Job as JobRow
+from glovecal_service.rest.job.answer import JobRow as ListedJob
+from glovecal_service.store.records import JobState
 
 app = typer.Typer(help="Jobs (long work): state, progress, cancel.", no_args_is_help=True)
 
 
 @app.command("list")
-def list_jobs(as_json: AsJson = False) -> None:
+def list_jobs(
+    subject: OnlySubject = None,
+    kind: Annotated[str | None, typer.Option(help="Only of this kind, such as train.")] = None,
+    state: Annotated[JobState | None, typer.Option(help="Only in this state.")] = None,
+    text: Words = None,
+    since: Since = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
+    as_json: AsJson = False,
+) -> None:
     """List jobs, newest first."""
+    query = {"subject": subject, "kind": kind, "state": state, "text": text, "since": since}
+    wanted = Wanted(limit, every, after, as_json)
     with connect() as service:
-        found = service.get("/jobs")
-    rows = read_or_print(list[JobRow], found, as_json)
+        rows = wanted.rows(service, ListedJob, "/jobs", filtered("job list", **query), query)
     shown = [
         {**vars(row), "done": f"{100 * row.fraction:.0f} %", "last": row.error or row.sentence}
         for row in rows

@@ -11,7 +11,7 @@ import typer
 from glovecal_models.comparison.answer import EACH_POSE, SideBySide
 from glovecal_models.comparison.where.answer import NOISE_FLOORS
 from glovecal_service.cli.asking import Ceiling, wait_for_ceiling
-from glovecal_service.cli.take.rows import find_takes, stored_takes
+from glovecal_service.cli.take.rows import named_takes, stored_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Model, Models
 from glovecal_service.cli.terminal.presenting import present
@@ -127,7 +127,7 @@ def _takes(
     ``else_trained_on`` will do.
     """
     if wanted:
-        return [take.id for take in find_takes(stored_takes(service), wanted)]
+        return [take.id for take in named_takes(service, list(wanted))]
     subject, layout = models[0].subject, models[0].layout
     rows = stored_takes(service, subject=subject, layout=layout, hand=models[0].hand)
     trained = {take for model in models for take in model.trained_on}

@@ -17,6 +17,15 @@ from glovecal_service.cli.model.vendor_files import (
     print_left_out,
 )
 from glovecal_service.cli.terminal.connection import connect, stored_models
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Since,
+    Wanted,
+    Words,
+    filtered,
+)
 from glovecal_service.cli.terminal.options import (
     AsJson,
     Model,
@@ -56,11 +65,21 @@ app.command("report")(verb(CALIBRATION_REPORT))
 
 
 @app.command("list")
-def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
-    """List models, oldest first; the active one of each subject, layout and hand is marked."""
+def list_models(
+    subject: OnlySubject = None,
+    layout: OnlyLayout = None,
+    text: Words = None,
+    since: Since = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
+    as_json: AsJson = False,
+) -> None:
+    """List models, the newest last; the active one of each subject, layout and hand is marked."""
+    query = {"subject": subject, "layout": layout, "text": text, "since": since}
+    wanted, command = Wanted(limit, every, after, as_json), filtered("model list", **query)
     with connect() as service:
-        found = service.get("/models", {"subject": subject, "layout": layout})
-    rows = read_or_print(list[ModelRow], found, as_json)
+        rows = wanted.rows(service, ModelRow, "/models", command, query, newest_last=True)
     shown = [
         {**vars(row), "short": row.short, "method": _method(row), "errors": _errors(row)} for row in rows
     ]
@@ -80,7 +99,7 @@ def list_models(subject: OnlySubject = None, layout: OnlyLayout = None, as_json:
         out.print("Errors: in a wearing not seen / in wearings seen.")
     for row in rows:
         if row.damage:
-            err.print(f"Damaged and active: {row.damage}", style="red")
+            err.print(f"Damaged: {row.damage}", style="red")
 
 
 @app.command("name")

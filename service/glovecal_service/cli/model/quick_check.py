@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from glovecal_service.cli.model.models import active_model
-from glovecal_service.cli.take.rows import find_takes, stored_takes
+from glovecal_service.cli.take.rows import named_takes
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, model_id
 from glovecal_service.cli.terminal.presenting import present
@@ -37,7 +37,7 @@ def quick_check(
         raise typer.BadParameter("name the takes with the poses: --take NAME")
     with connect() as service:
         chosen = model or active_model(service, subject, layout)
-        rows = find_takes(stored_takes(service), take)
+        rows = named_takes(service, take)
         body = {"takes": [row.id for row in rows], "activate": activate}
         found = service.post(f"/models/{chosen}/quick-check", body)
     present(read_or_print(QUESTION.answer, found, as_json).presentation())

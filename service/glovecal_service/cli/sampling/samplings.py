@@ -21,8 +21,16 @@ from glovecal_models.sampling.catalogue import PROTOCOLS, Order
 from glovecal_models.sampling.state import TRIGGERS
 from glovecal_service.cli.sampling.next_steps import next_steps
 from glovecal_service.cli.terminal.connection import connect
-from glovecal_service.cli.terminal.options import JOB_ID, AsJson, identifier, subject_named
-from glovecal_service.cli.terminal.printing import Refusal, err, out, print_json, print_table, read_or_print
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Since,
+    Wanted,
+    filtered,
+)
+from glovecal_service.cli.terminal.options import JOB_ID, AsJson, OnlySubject, identifier, subject_named
+from glovecal_service.cli.terminal.printing import Refusal, err, out, print_json, print_table
 from glovecal_service.operating_system import single_keys
 from glovecal_service.plain import read
 from glovecal_service.rest.sampling.answer import SamplingView
@@ -94,12 +102,18 @@ def list_samplings(
     glove: Annotated[
         str | None, typer.Option(help="Only this glove's.", callback=identifier("glove"))
     ] = None,
+    subject: OnlySubject = None,
+    since: Since = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
     as_json: AsJson = False,
 ) -> None:
     """Show samplings, newest first."""
+    query = {"glove": glove, "subject": subject, "since": since}
+    wanted = Wanted(limit, every, after, as_json)
     with connect() as service:
-        found = service.get("/sampling", {"glove": glove})
-    views = read_or_print(list[SamplingView], found, as_json)
+        views = wanted.rows(service, SamplingView, "/sampling", filtered("sample list", **query), query)
     rows = [
         {
             **vars(view),

@@ -15,6 +15,14 @@ from glovecal_models.hand.rotations import HANDS, Handedness
 from glovecal_models.hand.skeleton import Palm
 from glovecal_service.cli.take.rows import stored_takes
 from glovecal_service.cli.terminal.connection import connect, stored_models
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Wanted,
+    Words,
+    filtered,
+)
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, subject_named
 from glovecal_service.cli.terminal.printing import (
     Overwrite,
@@ -165,11 +173,17 @@ def _origin(dimension: str, measured: list[str]) -> str:
 
 
 @app.command("list")
-def list_subjects(as_json: AsJson = False) -> None:
-    """List all subjects."""
+def list_subjects(
+    text: Words = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
+    as_json: AsJson = False,
+) -> None:
+    """List subjects by name."""
+    wanted, query = Wanted(limit, every, after, as_json), {"text": text}
     with connect() as service:
-        found = service.get("/subjects")
-    rows = read_or_print(list[SubjectRow], found, as_json)
+        rows = wanted.rows(service, SubjectRow, "/subjects", filtered("subject list", **query), query)
     rows = [{**vars(row), "title": row.title or None} for row in rows]
     columns = {"name": "subject", "title": "name", "created_at": "added"}
     print_table(rows, columns, empty="No subjects yet. Add one: glovecal subject add NAME")

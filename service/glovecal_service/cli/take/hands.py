@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.take.rows import find_take, stored_takes
+from glovecal_service.cli.take.rows import named_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import out, read_or_print
@@ -24,7 +24,6 @@ def hands(
     "glovecal take motion" joins two takes by the same.
     """
     with connect() as service:
-        rows = stored_takes(service)
-        wanted = [find_take(rows, name).id for name in (first, second)]
+        wanted = [named_take(service, name).id for name in (first, second)]
         found = service.post("/takes/hands", {"takes": wanted, "claps": claps})
     out.print(read_or_print(HandAlignmentView, found, as_json).sentence)

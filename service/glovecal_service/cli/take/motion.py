@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 import typer
 
 from glovecal_models.hand.rotations import Handedness
-from glovecal_service.cli.take.rows import find_take, stored_takes
+from glovecal_service.cli.take.rows import named_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import model_id
 from glovecal_service.cli.terminal.printing import Overwrite, out, require_place, write_whole
@@ -136,9 +136,8 @@ def motion(
         raise typer.BadParameter(f"{len(take)} takes are too many: one, or one of each hand")
     require_place(file, overwrite=overwrite)
     with connect() as service:
-        rows = stored_takes(service)
         asked: dict[str, Any] = {
-            "takes": [find_take(rows, name).id for name in take],
+            "takes": [named_take(service, name).id for name in take],
             "models": model or [],
             "hands": hand or [],
             "content": content,

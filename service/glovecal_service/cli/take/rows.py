@@ -26,12 +26,30 @@ COLUMNS = {
     "simulated": "sim",
 }
 MOST_SHOWN = 8
+MOST_ALIKE, LONGEST_TEXT = 1000, 200
 SHORTEST_BEGINNING = 4
 
 
 def stored_takes(service: RestClient, **query: str | None) -> list[Take]:
     """``query``: subject, layout and hand, each or None."""
     return read(list[Take], service.get("/takes", query))
+
+
+def named_take(service: RestClient, wanted: str) -> Take:
+    """The stored take that is meant. Raises Refusal that lists what could be meant."""
+    return named_takes(service, [wanted])[0]
+
+
+def named_takes(service: RestClient, wanted: Sequence[str]) -> list[Take]:
+    """Each stored take that is meant, once."""
+    rows: dict[str, Take] = {}
+    for name in wanted:
+        query = {"text": name[:LONGEST_TEXT], "reverse": True, "limit": MOST_ALIKE}
+        found = read(list[Take], service.get("/takes", query))
+        if not found:  # what could be meant
+            found = read(list[Take], service.get("/takes", {"reverse": True, "limit": MOST_ALIKE}))
+        rows |= {row.id: row for row in found}
+    return find_takes(list(rows.values()), wanted)
 
 
 def print_takes(rows: Sequence[Take], *, empty: str) -> None:

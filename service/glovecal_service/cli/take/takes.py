@@ -19,8 +19,17 @@ from glovecal_service.cli.take import (
     time_code,
     video,
 )
-from glovecal_service.cli.take.rows import find_take, find_takes, print_takes, stored_takes
+from glovecal_service.cli.take.rows import find_takes, named_take, named_takes, print_takes, stored_takes
 from glovecal_service.cli.terminal.connection import connect
+from glovecal_service.cli.terminal.listing import (
+    AfterPlace,
+    EveryRow,
+    MostRows,
+    Since,
+    Wanted,
+    Words,
+    filtered,
+)
 from glovecal_service.cli.terminal.options import AsJson, OnlyLayout, OnlySubject, Take, identifier
 from glovecal_service.cli.terminal.printing import (
     Overwrite,
@@ -65,11 +74,21 @@ FORMATS = (".csv", ".parquet")
 
 
 @app.command("list")
-def list_takes(subject: OnlySubject = None, layout: OnlyLayout = None, as_json: AsJson = False) -> None:
-    """List takes, oldest first."""
+def list_takes(
+    subject: OnlySubject = None,
+    layout: OnlyLayout = None,
+    text: Words = None,
+    since: Since = None,
+    limit: MostRows = None,
+    every: EveryRow = False,
+    after: AfterPlace = None,
+    as_json: AsJson = False,
+) -> None:
+    """List takes, the newest last."""
+    query = {"subject": subject, "layout": layout, "text": text, "since": since}
+    wanted, command = Wanted(limit, every, after, as_json), filtered("take list", **query)
     with connect() as service:
-        found = service.get("/takes", {"subject": subject, "layout": layout})
-    rows = read_or_print(list[TakeRow], found, as_json)
+        rows = wanted.rows(service, TakeRow, "/takes", command, query, newest_last=True)
     print_takes(rows, empty="No takes yet. Import some: glovecal take import FILE --subject NAME")
 
 
@@ -209,8 +228,11 @@ def use_layout(
     if not take and subject is None:
         raise typer.BadParameter("say which: TAKE ..., or all takes of a subject with --subject")
     with connect() as service:
-        rows = stored_takes(service, subject=subject)
-        wanted = find_takes(rows, take) if take else rows
+        if take and subject is None:
+            wanted = named_takes(service, take)
+        else:
+            rows = stored_takes(service, subject=subject)
+            wanted = find_takes(rows, take) if take else rows
         for row in wanted:
             service.put(f"/takes/{row.id}/layout", {"layout": layout})
     out.print(f"Read by layout {layout} from now on: {', '.join(row.name for row in wanted) or 'no take'}.")
@@ -257,10 +279,10 @@ def _left_out(take: TakeRow) -> str:
 def remove(take: Take) -> None:
     """Remove a take that no model was trained on. The file it came from stays in the data folder."""
     with connect() as service:
-        row = find_take(stored_takes(service), take)
+        row = named_take(service, take)
         service.delete(f"/takes/{row.id}")
     out.print(f"Removed take {row.name} ({row.id}).")
 
 
 def _id(service: RestClient, take: str) -> str:
-    return find_take(stored_takes(service), take).id
+    return named_take(service, take).id

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from glovecal_models.takes.time_code import RATES, TimeCode
-from glovecal_service.cli.take.rows import find_take, stored_takes
+from glovecal_service.cli.take.rows import named_take
 from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Take
 from glovecal_service.cli.terminal.printing import err, out, print_json
@@ -53,7 +53,7 @@ def timecode(
     elif label is not None:
         body = {"time_code": label, "rate": rate, "at_s": at_s}
     with connect() as service:
-        row = find_take(stored_takes(service), take)
+        row = named_take(service, take)
         if remove:
             row = read(TakeRow, service.delete(f"/takes/{row.id}/time-code"))
         elif body is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from glovecal_service.cli.take.rows import find_take, stored_takes
+from glovecal_service.cli.take.rows import named_take
 from glovecal_service.cli.terminal.connection import connect
 
 
@@ -21,4 +21,4 @@ def video(
     from glovecal_service.cli.glove.beside import attach_video
 
     with connect() as service:
-        attach_video(service, file, [find_take(stored_takes(service), take).id])
+        attach_video(service, file, [named_take(service, take).id])

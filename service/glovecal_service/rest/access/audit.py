@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 
 from glovecal_service.rest.access.answer import AuditCheck, AuditRow
 from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.list_part import Searched
 from glovecal_service.rest.http.problem import problems
 
 router = APIRouter(prefix="/audit", tags=["access"])
-MOST_AT_ONCE = 1000
 
 
 @router.get("", summary="Who changed what", responses=problems())
-def list_audit(
-    store: StoreNeeded,
-    limit: Annotated[int, Query(ge=1, le=MOST_AT_ONCE)] = 100,
-    before: Annotated[int | None, Query(ge=1, le=2**53, description="Entries older than this id.")] = None,
-) -> list[AuditRow]:
+def list_audit(store: StoreNeeded, paging: Searched) -> list[AuditRow]:
     """Newest first. What changes all the time and decides nothing is left out: how far a job is."""
-    entries = store.audit.list(limit=limit, before=before)
     return [
         AuditRow(**{name: value for name, value in vars(one).items() if name != "previous"})
-        for one in entries
+        for one in paging.answer(store.audit.page(paging.part))
     ]
 
 

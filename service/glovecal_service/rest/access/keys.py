@@ -11,6 +11,7 @@ from glovecal_client.site.roles import Role
 from glovecal_service.request_types import StrictBody, SubjectName
 from glovecal_service.rest.access.answer import Key, NewKey
 from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.list_part import Searched
 from glovecal_service.rest.http.problem import change_problems, problems
 
 router = APIRouter(prefix="/keys", tags=["access"])
@@ -29,9 +30,12 @@ class KeyBody(Scope):
 
 
 @router.get("", summary="Keys", responses=problems())
-def list_keys(store: StoreNeeded) -> list[Key]:
+def list_keys(store: StoreNeeded, paging: Searched) -> list[Key]:
     """By name, those that were revoked among them."""
-    return [Key.model_validate(record, from_attributes=True) for record in store.keys.list()]
+    return [
+        Key.model_validate(record, from_attributes=True)
+        for record in paging.answer(store.keys.page(paging.part))
+    ]
 
 
 @router.post("", status_code=201, summary="Make a key", responses=change_problems(409))

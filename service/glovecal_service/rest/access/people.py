@@ -12,6 +12,7 @@ from glovecal_service.request_types import StrictBody
 from glovecal_service.rest.access.answer import Person
 from glovecal_service.rest.access.keys import KeyBody, Scope
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
+from glovecal_service.rest.http.list_part import Searched
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import SubjectInPath
 from glovecal_service.store.passwords import LEAST_CHARACTERS, MOST_CHARACTERS
@@ -36,9 +37,9 @@ class PasswordBody(StrictBody):
 
 
 @router.get("", summary="People who log in", responses=problems())
-def list_people(store: StoreNeeded) -> list[Person]:
+def list_people(store: StoreNeeded, paging: Searched) -> list[Person]:
     """By name, those that were removed among them."""
-    return [_row(record) for record in store.people.list()]
+    return [_row(record) for record in paging.answer(store.people.page(paging.part))]
 
 
 @router.post("", status_code=201, summary="Add a person who logs in", responses=change_problems(409))

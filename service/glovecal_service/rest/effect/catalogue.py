@@ -14,6 +14,7 @@ from glovecal_models.names import did_you_mean
 from glovecal_service.plain import plain
 from glovecal_service.questions.add_effect import CAN_BE_ADDED
 from glovecal_service.rest.effect.answer import CatalogueEffect, ParameterView, SchematicView
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import problems
 from glovecal_service.rest.http.request_types import EffectInPath
 from glovecal_service.store.errors import NotFound
@@ -27,11 +28,12 @@ MOST_MOMENTS = 400
 @router.get(
     "", response_model=list[CatalogueEffect], summary="The catalogue of effects", responses=problems()
 )
-def list_effects() -> list[CatalogueEffect]:
+def list_effects(paging: InParts) -> list[CatalogueEffect]:
     """Those of Glovecal by name, then the user's own. Effects declared in a text are with their models."""
     packages = effect_packages()
     rows = [_row(item, packages.get(name, "")) for name, item in sorted(catalogue().items())]
-    return sorted(rows, key=lambda row: (row.own, row.kind == "nothing"))
+    ordered = sorted(rows, key=lambda row: (row.own, row.kind == "nothing"))
+    return paging.part_of(ordered, lambda row: row.name)
 
 
 @router.get("/{name}", response_model=CatalogueEffect, summary="One effect", responses=problems())

@@ -14,6 +14,7 @@ from glovecal_service.request_types import StrictBody
 from glovecal_service.rest.first_run.answer import HiddenEffectView
 from glovecal_service.rest.first_run.simulated_glove import training_of
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import SubjectInPath
 from glovecal_service.rest.job.jobs import new_job
@@ -42,7 +43,7 @@ def hide_effect(body: NewHiddenEffect, parts: PartsNeeded, response: Response) -
     store = parts.store
     seed = secrets.randbelow(SEEDS) if body.seed is None else body.seed
     subject = subject_of(seed)
-    if subject in {each.name for each in store.subjects.list()}:
+    if subject in store.subjects.names():
         raise Conflict(f"subject {subject} is here already; give another seed")
     session = hidden_session("random", seed)
     session.write_truth(HiddenEffects(parts.settings.data).folder(subject))
@@ -64,10 +65,11 @@ def hide_effect(body: NewHiddenEffect, parts: PartsNeeded, response: Response) -
 @router.get(
     "", response_model=list[HiddenEffectView], summary="Hidden effects, newest first", responses=problems()
 )
-def list_hidden_effects(parts: PartsNeeded) -> list[HiddenEffectView]:
+def list_hidden_effects(parts: PartsNeeded, paging: InParts) -> list[HiddenEffectView]:
     """Of subjects that are still there."""
-    here = {each.name for each in parts.store.subjects.list()}
-    return [_view(parts, name) for name in HiddenEffects(parts.settings.data).subjects() if name in here]
+    here = parts.store.subjects.names()
+    known = [name for name in HiddenEffects(parts.settings.data).subjects() if name in here]
+    return [_view(parts, name) for name in paging.part_of(known, str)]
 
 
 @router.get("/{subject}", response_model=HiddenEffectView, summary="One hidden effect", responses=problems())

@@ -16,6 +16,7 @@ from glovecal_service.camera.started_cameras import StartedCamera
 from glovecal_service.request_types import Identifier, StrictBody, SubjectName
 from glovecal_service.rest.glove.answer import CameraHealthView, CameraView, Kept, Stage
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import NameInPath
 from glovecal_service.store.errors import Conflict, NotFound
@@ -85,9 +86,9 @@ def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
 
 
 @router.get("", response_model=list[CameraView], summary="Cameras", responses=problems())
-def list_cameras(parts: PartsNeeded) -> list[CameraView]:
+def list_cameras(parts: PartsNeeded, paging: InParts) -> list[CameraView]:
     """Those that answer, wherever they were started, and those that this service started and that ended."""
-    return [view for _, view in sorted(_cameras(parts).items())]
+    return paging.part_of((view for _, view in sorted(_cameras(parts).items())), lambda view: view.glove)
 
 
 @router.get("/{glove}", response_model=CameraView, summary="One camera", responses=problems())

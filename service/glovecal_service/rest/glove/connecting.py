@@ -13,6 +13,7 @@ from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_service.request_types import StrictBody
 from glovecal_service.rest.glove.answer import GloveDevice, SerialPort
 from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.store.errors import Conflict
 
@@ -53,14 +54,15 @@ def look_at_serial_ports(body: AllPorts) -> list[SerialPort]:
 @router.get(
     "/glove-devices", response_model=list[GloveDevice], summary="Gloves that are known", responses=problems()
 )
-def list_glove_devices(parts: PartsNeeded) -> list[GloveDevice]:
+def list_glove_devices(parts: PartsNeeded, paging: InParts) -> list[GloveDevice]:
     """Those that are built in, and drivers installed on the service's computer."""
     zenoh = parts.settings.zenoh
     elsewhere = "" if zenoh == DEFAULT_ENDPOINT else f" --connect {zenoh}"
-    return [
+    devices = [
         GloveDevice(
             name=device.name, sentence=device.about,
             command=f"glovecal capture --device {device.usage} --glove GLOVE --subject SUBJECT{elsewhere}",
         )
         for device in installed_devices()
     ]  # fmt: skip
+    return paging.part_of(devices, lambda device: device.name)

@@ -15,6 +15,7 @@ from glovecal_client.session import ask, json_object, open_client
 from glovecal_service.realtime.service_status import all_service_statuses
 from glovecal_service.rest.glove.answer import LiveGlove
 from glovecal_service.rest.http.dependencies import PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import change_problems
 from glovecal_service.store.errors import Conflict
 
@@ -27,7 +28,7 @@ it hears the glove, not since when that is on."""
 
 
 @router.get("", response_model=list[LiveGlove], summary="Gloves now", responses=change_problems(409))
-def live_gloves(parts: PartsNeeded) -> list[LiveGlove]:
+def live_gloves(parts: PartsNeeded, paging: InParts) -> list[LiveGlove]:
     """Each glove whose frames arrive: how it is served, and warnings. 409 where real time does not answer."""
     try:
         with open_client((parts.settings.zenoh,), wait_s=WITHIN_S) as session:
@@ -43,7 +44,7 @@ def live_gloves(parts: PartsNeeded) -> list[LiveGlove]:
             view = _as_said(glove, one, on_for.get((glove, run_id)))
             if view is not None and parts.store.actor.sees(view.subject):
                 found.setdefault(glove, view)
-    return list(found.values())
+    return paging.part_of(found.values(), lambda view: view.glove)
 
 
 def _as_said(glove: str, said: Any, on_for_s: float | None) -> LiveGlove | None:

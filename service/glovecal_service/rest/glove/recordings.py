@@ -18,10 +18,11 @@ from glovecal_service.request_types import (
 )
 from glovecal_service.rest.glove.answer import Recording
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
-from glovecal_service.rest.http.request_types import IdInPath
+from glovecal_service.rest.http.list_part import ByTime
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
 from glovecal_service.store.recordings import LONGEST_PRE_ROLL_S, PRE_ROLL_S
-from glovecal_service.store.records import RecordingRecord
+from glovecal_service.store.records import OPEN_RECORDING_STATES, RecordingRecord, RecordingState
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
 
@@ -103,12 +104,15 @@ def start_recording(body: NewRecording, store: StoreNeeded, response: Response) 
 @router.get("", response_model=list[Recording], summary="Recordings, newest first", responses=problems())
 def list_recordings(
     store: StoreNeeded,
-    response: Response,
+    paging: ByTime,
     glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
+    subject: SubjectFilter = None,
+    state: RecordingState | None = None,
     only_open: bool = False,
 ) -> list[RecordingRecord]:
-    """Damaged rows are left out and named in `Warning` headers."""
-    return without_damaged(response, lambda: store.recordings.list(glove, only_open=only_open))
+    """Damaged rows are left out and named in `Warning` headers. More than `limit`: see `Link`."""
+    states = OPEN_RECORDING_STATES if only_open else None if state is None else (state,)
+    return paging.answer(store.recordings.page(paging.part, glove=glove, subject=subject, states=states))
 
 
 @router.get("/{id}", response_model=Recording, summary="One recording", responses=problems())

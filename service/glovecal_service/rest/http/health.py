@@ -197,10 +197,10 @@ def _state(parts: Parts) -> list[tuple[str, str]]:
         ("state", "ready" if running else "gloves are not served"),
         ("real-time process", "running" if running else "not seen"),
         ("database", f"{storage.database}, {storage.artifacts}"),
-        ("subjects", str(len(store.subjects.list()))),
+        ("subjects", str(store.subjects.count())),
         ("takes", str(store.takes.count())),
         ("models", str(store.models.count())),
-        ("gloves seen", ", ".join(glove.name for glove in store.gloves.list()) or "none"),
+        ("gloves seen", ", ".join(sorted(store.gloves.names())) or "none"),
     ]
 
 

@@ -6,7 +6,7 @@ Lists go on without damaged rows; each of those is named in a ``Warning`` header
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any, TypeVar
 
@@ -96,9 +96,13 @@ def without_damaged(response: Response, read: Callable[[], list[Record]]) -> lis
     try:
         return read()
     except DamagedRows as error:
-        for sentence in error.damaged[:MOST_WARNINGS]:
-            warn(response, sentence)
+        warn_of_damaged(response, error.damaged)
         return error.sound
+
+
+def warn_of_damaged(response: Response, sentences: Sequence[str]) -> None:
+    for sentence in sentences[:MOST_WARNINGS]:
+        warn(response, sentence)
 
 
 def warn(response: Response, sentence: str) -> None:

@@ -50,5 +50,12 @@ class JobFacts(Row):
         return (self.finished_at - self.started_at).total_seconds()
 
 
+class JobRow(JobFacts):
+    """In a list."""
+
+    has_result: bool = Field(description="Whether it found or made something: `GET /v1/jobs/{id}`.")
+    model: str | None = Field(description="That its result names.")
+
+
 class Job(JobFacts):
     result: dict[str, Any] | None = Field(description="Of a job of its kind: see where it is begun.")

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import ValidationError
 
@@ -16,14 +16,16 @@ from glovecal_models.presentation.document import AboutTakes
 from glovecal_service.plain import document_of, plain
 from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.questions.model_work import model_title
+from glovecal_service.request_types import IDENTIFIER
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.list_part import PartWanted, tell_rest
-from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
+from glovecal_service.rest.http.list_part import ByTime
+from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.report_page import REPORT, ReportFormat, report_response
 from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
-from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.job.answer import Job, JobFacts, JobRow
 from glovecal_service.store.errors import Conflict
-from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord
+from glovecal_service.store.jobs import UNFINISHED_JOB_STATES
+from glovecal_service.store.records import FINISHED_JOB_STATES, JobEvent, JobRecord, JobState
 from glovecal_service.store.store import Store
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -34,22 +36,26 @@ LONGEST_STREAM_S = 3600.0
 """After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
 
 
-@router.get("", response_model=list[Job], summary="Jobs, newest first", responses=problems())
+@router.get("", response_model=list[JobRow], summary="Jobs, newest first", responses=problems())
 def list_jobs(
     store: StoreNeeded,
-    request: Request,
-    response: Response,
-    part: PartWanted,
+    paging: ByTime,
     subject: SubjectFilter = None,
+    kind: Annotated[str | None, Query(pattern=IDENTIFIER, description="Such as `train`.")] = None,
+    state: JobState | None = None,
     only_unfinished: bool = False,
-) -> list[Job]:
-    """Damaged rows are left out and named in `Warning` headers. More than `limit`: see `Link`."""
-    total = store.jobs.count(subject=subject, only_unfinished=only_unfinished, part=part)
-    tell_rest(request, response, part, total)
-    records = without_damaged(
-        response, lambda: store.jobs.list(subject=subject, only_unfinished=only_unfinished, part=part)
-    )
-    return [_job(record) for record in records]
+) -> list[JobRow]:
+    """Without their results, which `GET /v1/jobs/{id}` has. Damaged rows are left out and named in `Warning`
+    headers. More than `limit`: see `Link`."""
+    states = UNFINISHED_JOB_STATES if only_unfinished else None if state is None else (state,)
+    page = store.jobs.page(paging.part, subject=subject, states=states, kind=kind)
+    return [_row(record) for record in paging.answer(page)]
+
+
+def _row(record: JobRecord) -> JobRow:
+    result = record.result or {}
+    own = {name: getattr(record, name) for name in JobFacts.model_fields}
+    return JobRow(**own, has_result=bool(result), model=result.get("model"))
 
 
 @router.get("/{id}", response_model=Job, summary="One job", responses=problems())

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
 from glovecal_models.calibration.answer import ModelEffect
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.text import model_effect, wearing_sentences
 from glovecal_models.errors import DamagedArtifact
-from glovecal_models.hand.rotations import Handedness, is_of_hand
+from glovecal_models.hand.rotations import Handedness
 from glovecal_models.regression.kernel_candidates import CANDIDATE
 from glovecal_models.regression.kernel_scores import choice_of
 from glovecal_models.regression.linear_regressor import LinearRegressor, gains_of
@@ -20,8 +20,8 @@ from glovecal_models.regression.regressor import Regressor
 from glovecal_service.plain import document_of, plain, plain_text, read
 from glovecal_service.request_types import Identifier, StrictBody, SubjectName
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
-from glovecal_service.rest.http.list_part import PartWanted, tell_rest
-from glovecal_service.rest.http.problem import change_problems, problems, warn, without_damaged
+from glovecal_service.rest.http.list_part import ByTime, InParts
+from glovecal_service.rest.http.problem import change_problems, problems, warn_of_damaged
 from glovecal_service.rest.http.request_types import HandFilter, LayoutFilter, ModelInPath, SubjectFilter
 from glovecal_service.rest.model.answer import (
     ActivationView,
@@ -34,7 +34,6 @@ from glovecal_service.rest.model.answer import (
     UnseenWearingView,
 )
 from glovecal_service.store import tables
-from glovecal_service.store.errors import StoreDamaged
 from glovecal_service.store.records import NAME, NOTE, Activation, ModelRecord
 
 router = APIRouter(prefix="/models", tags=["models"])
@@ -49,9 +48,7 @@ class Which(StrictBody):
 @router.get("", response_model=list[Model], summary="Models, oldest first", responses=problems())
 def list_models(
     store: StoreNeeded,
-    request: Request,
-    response: Response,
-    part: PartWanted,
+    paging: ByTime,
     subject: SubjectFilter = None,
     layout: LayoutFilter = None,
     hand: HandFilter = None,
@@ -59,15 +56,10 @@ def list_models(
 ) -> list[Model]:
     """Damaged rows are left out and named in `Warning` headers. `removed`: those that were removed. More than
     `limit`: see `Link`."""
-    tell_rest(request, response, part, store.models.count(subject, removed=removed, part=part))
-    every = without_damaged(response, lambda: store.models.list(subject, layout, removed=removed, part=part))
-    records = [record for record in every if is_of_hand(record.hand, hand)]
-    active = set()
-    for pair in sorted({(record.subject, record.layout) for record in records}):
-        try:
-            active |= {found.id for found in store.models.active_of_each_hand(*pair)}
-        except StoreDamaged as error:
-            warn(response, str(error))
+    page = store.models.page(paging.part, subject=subject, layout=layout, hand=hand, removed=removed)
+    records = paging.answer(page)
+    active, damaged_activations = store.models.active_among(records)
+    warn_of_damaged(paging.response, damaged_activations)
     damaged = store.damages.of_models([record.id for record in records])
     return [model_row(record, record.id in active, damaged.get(record.id, "")) for record in records]
 
@@ -125,9 +117,10 @@ def restore_model(id: ModelInPath, store: StoreNeeded) -> Model:
     summary="The model, its parent, the parent's parent ...",
     responses=problems(409),
 )
-def get_lineage(id: ModelInPath, store: StoreNeeded) -> list[Model]:
-    line = store.models.lineage(id)
-    return [model_row(record, store.models.is_active(record)) for record in line]
+def get_lineage(id: ModelInPath, store: StoreNeeded, paging: InParts) -> list[Model]:
+    line = paging.part_of(store.models.lineage(id), lambda record: record.id)
+    active, _ = store.models.active_among(line)
+    return [model_row(record, record.id in active) for record in line]
 
 
 @router.post(

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from glovecal_models.presentation.document import counted
 from glovecal_service.request_types import SubjectName
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.problem import problems, without_damaged
+from glovecal_service.rest.http.problem import problems, warn_of_damaged, without_damaged
 from glovecal_service.rest.overview.answer import DEMO, FIRST_STEPS, IMPORT, NextStep, Overview
 from glovecal_service.store.list_part import ListPart
 from glovecal_service.store.records import GloveRecord, ModelRecord, TakeRecord
@@ -21,7 +21,7 @@ router = APIRouter(prefix="/overview", tags=["health"])
 SHORT = 12
 MOST_GLOVES = 3
 """Without a calibration that are told of."""
-LOOKED_AT = 500
+LOOKED_AT = 200
 """Of takes and of models, the newest ones: they say what is next."""
 
 
@@ -34,28 +34,31 @@ def get_overview(
 ) -> Overview:
     """Of everybody: the steps are those of whose take or model is the newest. Of one subject: its own."""
     newest = ListPart(LOOKED_AT, reverse=True)
-    takes = without_damaged(response, lambda: store.takes.list(subject=subject, part=newest))[::-1]
-    models = without_damaged(response, lambda: store.models.list(subject=subject, part=newest))[::-1]
-    every_take = store.takes.count(subject=subject)
-    every_model = store.models.count(subject=subject)
-    subjects = [each for each in store.subjects.list() if subject in (None, each.name)]
-    active = {model.id for model in store.models.all_active() if subject in (None, model.subject)}
+    of_takes = store.takes.page(newest, subject=subject)
+    of_models = store.models.page(newest, subject=subject)
+    warn_of_damaged(response, [*of_takes.damaged, *of_models.damaged])
+    takes, models = of_takes.records[::-1], of_models.records[::-1]
+    every_take, every_model = of_takes.total or 0, of_models.total or 0
+    every_active = store.models.count_active(subject)
+    subjects = store.subjects.count() if subject is None else len({subject} & store.subjects.names())
+    looked_at = [*models, *([store.models.get(model)] if model else [])]
+    active, _ = store.models.active_among(looked_at[-1:])
     teaching = [take for take in takes if take.teaches]
     seen = without_damaged(response, store.gloves.list)
     gloves = [glove for glove in seen if subject is None or glove.subject in (None, subject)]
     facts = [
-        counted(len(subjects), "subject"), counted(every_take, "take"),
-        f"{counted(every_model, 'model')}, {len(active)} active",
+        counted(subjects, "subject"), counted(every_take, "take"),
+        f"{counted(every_model, 'model')}, {every_active} active",
     ]  # fmt: skip
     return Overview(
-        subjects=len(subjects),
+        subjects=subjects,
         takes=every_take,
         teaching_takes=len(teaching),
         models=every_model,
-        active_models=len(active),
+        active_models=every_active,
         unfinished_jobs=sum(store.jobs.unfinished().values()),
         sentence=", ".join(facts) + "." if takes or models else "Nothing is here yet.",
-        steps=_steps(store, takes, [*models, *([store.models.get(model)] if model else [])], active, gloves),
+        steps=_steps(store, takes, looked_at, active, gloves),
     )
 
 

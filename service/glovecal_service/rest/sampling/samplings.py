@@ -38,8 +38,9 @@ from glovecal_service.request_types import (
     WearingName,
 )
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.problem import change_problems, problems, without_damaged
-from glovecal_service.rest.http.request_types import IdInPath
+from glovecal_service.rest.http.list_part import ByTime
+from glovecal_service.rest.http.problem import change_problems, problems
+from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
 from glovecal_service.rest.sampling.answer import Reused, SamplingView, StepDone, StepNow, TargetView
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import SamplingRecord
@@ -137,13 +138,14 @@ def start_sampling(body: NewSampling, store: StoreNeeded, response: Response) ->
 @router.get("", response_model=list[SamplingView], summary="Samplings, newest first", responses=problems())
 def list_samplings(
     store: StoreNeeded,
-    response: Response,
+    paging: ByTime,
     glove: Annotated[str | None, Query(pattern=IDENTIFIER)] = None,
+    subject: SubjectFilter = None,
     only_open: bool = False,
 ) -> list[SamplingView]:
-    """Damaged rows are left out and named in `Warning` headers."""
-    records = without_damaged(response, lambda: store.samplings.list(glove=glove, only_open=only_open))
-    return [_view(record) for record in records]
+    """Damaged rows are left out and named in `Warning` headers. More than `limit`: see `Link`."""
+    page = store.samplings.page(paging.part, glove=glove, subject=subject, only_open=only_open)
+    return [_view(record) for record in paging.answer(page)]
 
 
 @router.get("/{id}", response_model=SamplingView, summary="One sampling", responses=problems())

@@ -17,6 +17,7 @@ from glovecal_service.exports.robot_hand import RobotForm, robot_hand
 from glovecal_service.plain import plain
 from glovecal_service.request_types import Channel, Millimetres, StrictBody, SubjectName, Title
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
+from glovecal_service.rest.http.list_part import Searched
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import LayoutFilter, SubjectInPath
 from glovecal_service.rest.subject.answer import HistoryRowView, HistoryView, SkeletonView, Subject
@@ -103,9 +104,10 @@ def add_subject(body: NewSubject, store: StoreNeeded, response: Response) -> Sub
     return record
 
 
-@router.get("", response_model=list[Subject], summary="All subjects", responses=problems())
-def list_subjects(store: StoreNeeded) -> list[SubjectRecord]:
-    return store.subjects.list()
+@router.get("", response_model=list[Subject], summary="Subjects, by name", responses=problems())
+def list_subjects(store: StoreNeeded, paging: Searched) -> list[SubjectRecord]:
+    """More than `limit`: see `Link`."""
+    return paging.answer(store.subjects.page(paging.part))
 
 
 @router.get("/{name}", response_model=Subject, summary="One subject", responses=problems())

@@ -28,6 +28,7 @@ from glovecal_service.exports.resampling import Resampling
 from glovecal_service.exports.robot_motion import SUFFIXES
 from glovecal_service.request_types import ModelReference, StrictBody, TakeReference, Title
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.long_answers import in_process, in_time
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.temporary_folder import temporary_folder
@@ -121,9 +122,9 @@ class Motion(StrictBody):
 
 
 @router.get("", summary="Formats of motion files", responses=problems())
-def list_formats() -> list[MotionFormat]:
+def list_formats(paging: InParts) -> list[MotionFormat]:
     """What each holds, and how: units, axes, times, standard deviations."""
-    return [
+    formats = [
         MotionFormat(
             format=one.suffix.removeprefix("."),
             name=one.name,
@@ -138,6 +139,7 @@ def list_formats() -> list[MotionFormat]:
         )
         for one in FORMATS.values()
     ]
+    return paging.part_of(formats, lambda one: one.format)
 
 
 @router.post(

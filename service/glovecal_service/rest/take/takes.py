@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 from pydantic import Field, FiniteFloat
 from starlette.background import BackgroundTask
@@ -18,8 +18,8 @@ from glovecal_models.takes.write_table import write_takes
 from glovecal_service.plain import plain, plain_text
 from glovecal_service.request_types import ONE_LINE, Identifier, StrictBody
 from glovecal_service.rest.http.dependencies import StoreNeeded
-from glovecal_service.rest.http.list_part import PartWanted, tell_rest
-from glovecal_service.rest.http.problem import Problem, change_problems, problems, without_damaged
+from glovecal_service.rest.http.list_part import ByTime
+from glovecal_service.rest.http.problem import Problem, change_problems, problems
 from glovecal_service.rest.http.request_types import HandFilter, IdInPath, LayoutFilter, SubjectFilter
 from glovecal_service.rest.http.temporary_folder import temporary_folder
 from glovecal_service.rest.take.answer import CheckView, Take
@@ -33,17 +33,13 @@ router = APIRouter(prefix="/takes", tags=["takes"])
 @router.get("", response_model=list[Take], summary="Takes, oldest first", responses=problems())
 def list_takes(
     store: StoreNeeded,
-    request: Request,
-    response: Response,
-    part: PartWanted,
+    paging: ByTime,
     subject: SubjectFilter = None,
     layout: LayoutFilter = None,
     hand: HandFilter = None,
 ) -> list[TakeRecord]:
     """Damaged rows are left out and named in `Warning` headers. More than `limit`: see `Link`."""
-    tell_rest(request, response, part, store.takes.count(subject, part))
-    every = without_damaged(response, lambda: store.takes.list(subject=subject, layout=layout, part=part))
-    return [take for take in every if take.is_of(hand)]
+    return paging.answer(store.takes.page(paging.part, subject=subject, layout=layout, hand=hand))
 
 
 @router.get("/{id}", response_model=Take, summary="One take", responses=problems())

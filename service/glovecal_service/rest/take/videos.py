@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from glovecal_service.exports.motion_file import motion_of
 from glovecal_service.plain import plain
 from glovecal_service.request_types import SHA256_PREFIX, Sha256, StrictBody
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
+from glovecal_service.rest.http.list_part import InParts
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
 from glovecal_service.rest.take.answer import HandBeside, Video
@@ -36,14 +38,14 @@ class Attached(StrictBody):
 
 
 @router.get("", response_model=list[Video], summary="Takes with a video", responses=problems())
-def list_videos(parts: PartsNeeded, subject: SubjectFilter = None) -> list[Video]:
-    """Newest takes first; a damaged file is left out here and named when it is asked for."""
-    known = set(parts.videos.takes())
+def list_videos(parts: PartsNeeded, paging: InParts, subject: SubjectFilter = None) -> list[Video]:
+    """Newest takes first; a damaged file is left out here and named when it is asked for. More than `limit`:
+    see `Link`."""
+    part = replace(paging.part, reverse=True)
     found = []
-    for row in reversed(parts.store.takes.list(subject=subject)):
-        if row.id in known:
-            with suppress(BadInput):
-                found.append(_video(row, parts.videos.facts(row.id)))
+    for row in paging.answer(parts.store.takes.page(part, subject=subject, among=parts.videos.takes())):
+        with suppress(BadInput):
+            found.append(_video(row, parts.videos.facts(row.id)))
     return found
 
 

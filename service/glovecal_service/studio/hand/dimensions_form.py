@@ -10,8 +10,9 @@ from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.rest.subject.answer import SkeletonView, Subject
+from glovecal_service.rest.subject.answer import SkeletonView
 from glovecal_service.studio.heading import act, heading
+from glovecal_service.studio.person_choice import People
 from glovecal_service.studio.service import Service, refusals
 
 THUMB = "T"
@@ -30,16 +31,16 @@ class DimensionsForm:
         self._subject = ""
 
     async def build(self) -> None:
-        names = [each.name for each in await self._service.read(list[Subject], "/subjects")]
-        if not names:
+        people = await People.of(self._service)
+        if not people.names:
             return
-        self._subject = names[0]
+        self._subject = people.names[0]
         with ui.element("section").classes("tree hand-sizes").props('aria-label="Hand dimensions"'):
             heading(2, "Hand dimensions")
             ui.label(
                 "Hands on every page and errors of fingertips are of this size. Models stay as they are."
             )
-            ui.select(names, value=self._subject, label="Subject", on_change=self._choose).classes("choice")
+            people.select("Subject", self._subject, self._choose)
             self._shown = ui.element("div").classes("hand-sizes-pair")
             self._told = ui.label("").props('role="status"')
         await self._show()

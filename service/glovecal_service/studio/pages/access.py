@@ -8,10 +8,10 @@ from nicegui import ui
 
 from glovecal_service.plain import read
 from glovecal_service.rest.access.answer import AuditCheck, AuditRow, Key, NewKey
-from glovecal_service.rest.subject.answer import Subject
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import act, heading, main_act
 from glovecal_service.studio.pages.people import PeopleTable, ScopeChoice
+from glovecal_service.studio.person_choice import People
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -37,7 +37,7 @@ class AccessPage:
         self._service = studio.service
 
     async def build(self) -> None:
-        subjects = [row.name for row in await self._service.read(list[Subject], "/subjects")]
+        subjects = await People.of(self._service)
         heading(2, "Keys")
         ui.label(
             "Where others reach this service, each needs a key or a password; on this computer alone nobody "
@@ -61,7 +61,7 @@ class AccessPage:
         await self._look()
 
     async def _look(self) -> None:
-        keys = await self._service.read(list[Key], "/keys")
+        keys = await self._service.every(Key, "/keys")
         changes = await self._service.read(list[AuditRow], "/audit", limit=SHOWN)
         await self._people.look()
         self._keys.clear()

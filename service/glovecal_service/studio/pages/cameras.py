@@ -7,6 +7,7 @@ from nicegui import ui
 from glovecal_service.rest.glove.answer import CameraView
 from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.camera_card import STAGES, CameraCard
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -47,7 +48,7 @@ class CamerasPage:
         self._cameras = ui.element("div").classes("cameras")
         self._form()
         await self._look()
-        ui.timer(EVERY_S, self._look)
+        again(EVERY_S, self._look)
 
     def _form(self) -> None:
         with ui.element("section").classes("card capture-form").props('aria-label="New camera"'):

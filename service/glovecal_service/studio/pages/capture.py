@@ -19,6 +19,7 @@ from glovecal_service.studio.pages.capture_sampling import SamplingPage
 from glovecal_service.studio.pages.capture_session import SessionPage
 from glovecal_service.studio.pages.capture_start import SamplingForm, WearingForm
 from glovecal_service.studio.pages.take_view import add_take_styles
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -68,7 +69,7 @@ class CapturePage:
                 "studio-notice"
             )
             connect_or_try()
-            ui.timer(AGAIN_EVERY_S, self._again)
+            again(AGAIN_EVERY_S, self._again)
             return
         with self._main:
             if self._mode == "recording":

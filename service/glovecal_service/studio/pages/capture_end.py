@@ -114,7 +114,7 @@ class SamplingEnd:
     async def _check_once(self) -> None:
         service, view = self._studio.service, self._view
         worn = {"subject": view.subject, "layout": view.layout, "hand": await self._hand()}
-        models = await service.read(list[Model], "/models", **worn)
+        models = await service.every(Model, "/models", **worn)
         if any(each.facts.get("quick_check", {}).get("takes") == view.takes for each in models):
             with self._after:
                 ui.label("This wearing is checked; its model is on the page Models.")

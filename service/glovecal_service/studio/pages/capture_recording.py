@@ -18,6 +18,7 @@ from glovecal_service.studio.heading import heading, main_act
 from glovecal_service.studio.pages.glove_and_wearer import GloveAndWearer
 from glovecal_service.studio.pages.take_reference import TakeReference
 from glovecal_service.studio.pages.take_view import TakeView
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal, refusals, warn_long
 from glovecal_service.studio.studio import Studio
 
@@ -89,7 +90,7 @@ class RecordingPage:
         self._reference = TakeReference(self._studio, self._look_at)
         await self._reference.build()
         self._recording = await self._going_on()
-        self._timer = ui.timer(EVERY_S, self._look)
+        self._timer = again(EVERY_S, self._look)
         self._show()
 
     async def _going_on(self) -> Recording | None:

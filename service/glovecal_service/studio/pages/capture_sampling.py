@@ -22,6 +22,7 @@ from glovecal_service.studio.hand.hand_view import SIDES, HandView, side_buttons
 from glovecal_service.studio.heading import quiet_act
 from glovecal_service.studio.pages.capture_end import SamplingEnd
 from glovecal_service.studio.pages.capture_start import show_keys
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -82,7 +83,7 @@ class SamplingPage:
             with ui.expansion("Keys").classes("capture-steps"):
                 show_keys()
         self._follow_together()
-        self._timers = [ui.timer(EVERY_S, self._look), ui.timer(WORD_EVERY_S, self._say_state)]
+        self._timers = [again(EVERY_S, self._look), again(WORD_EVERY_S, self._say_state)]
         await self._show()
 
     def _buttons(self) -> None:

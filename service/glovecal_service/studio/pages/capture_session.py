@@ -12,6 +12,7 @@ from nicegui import ui
 from glovecal_service.rest.glove.answer import Card, GloveAnswers, Gloves, LiveGlove, Recording
 from glovecal_service.rest.take.answer import SessionDriftView
 from glovecal_service.studio.heading import heading
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import table, text_row
@@ -58,7 +59,7 @@ class SessionPage:
                 _act("Record at the end", partial(self._sequence, "end"))
             self._ask = ui.label("").classes("capture-ask").props('role="status"')
             self._drift = ui.element("div").props('aria-live="polite"')
-        self._timer = ui.timer(EVERY_S, self._look)
+        self._timer = again(EVERY_S, self._look)
         await self._look()
 
     async def _look(self) -> None:

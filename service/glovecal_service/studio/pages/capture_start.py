@@ -139,7 +139,7 @@ class WearingForm(_Form):
     async def _require_model(self) -> None:
         worn = self._worn
         query = {"subject": worn.subject or None, "layout": worn.layout, "hand": worn.hand}
-        models = await self._studio.service.read(list[Model], "/models", **query)
+        models = await self._studio.service.every(Model, "/models", **query)
         if not any(each.active for each in models):
             raise Refusal(409, f"No model is active for {worn.subject or 'nobody'}: sample and train first.")
 

@@ -33,6 +33,7 @@ from glovecal_service.studio.comparison.rotation_errors import RotationErrors, w
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.hidden_walk import HiddenWalk
 from glovecal_service.studio.next_steps import next_steps
+from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -80,7 +81,7 @@ class ComparePage:
         self._bar = ChoiceBar(models, takes, choice, self._show)
         self._walk = HiddenWalk(self._service)
         await self._sections()
-        ui.timer(0.0, self._begin, once=True)
+        soon(self._begin)
 
     async def _sections(self) -> None:
         self._busy = ui.label("Comparing …").classes("compare-busy").props('role="status"')

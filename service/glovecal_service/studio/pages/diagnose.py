@@ -15,7 +15,7 @@ from glovecal_models.diagnosis.answer import MissingEffects, NamedEffect
 from glovecal_models.improvement.answer import EffectAdded
 from glovecal_service.plain import read
 from glovecal_service.rest.effect.answer import CatalogueEffect
-from glovecal_service.rest.job.answer import Job, JobFacts
+from glovecal_service.rest.job.answer import Job, JobFacts, JobRow
 from glovecal_service.rest.model.answer import Model
 from glovecal_service.studio.amounts import degrees
 from glovecal_service.studio.findings.candidate_table import bar_key, candidate_table
@@ -23,6 +23,7 @@ from glovecal_service.studio.findings.effect_view import EffectView
 from glovecal_service.studio.heading import goes_live, heading
 from glovecal_service.studio.hidden_walk import HiddenWalk
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -40,15 +41,15 @@ def add(studio: Studio) -> None:
         async with shell(studio, "diagnose", "Diagnose", about_models=True) as around:
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
             if model := await around.model(studio.service):
-                await DiagnosePage(studio, model.id).build()
+                await DiagnosePage(studio, model).build()
 
 
 class DiagnosePage:
     """One open page."""
 
-    def __init__(self, studio: Studio, model: str) -> None:
+    def __init__(self, studio: Studio, model: Model) -> None:
         self._studio = studio
-        self._model = model
+        self._model, self._subject = model.id, model.subject
         self._goes_live = False
 
     async def build(self) -> None:
@@ -64,7 +65,8 @@ class DiagnosePage:
         """What was found for this model before, or that is under way."""
         self._findings.clear()
         await self._walk.show(self._model)
-        jobs = await self._studio.service.read(list[Job], "/jobs", text=self._model)
+        service = self._studio.service
+        jobs = await service.every(JobRow, "/jobs", subject=self._subject, text=self._model)
         own = [
             job
             for job in jobs
@@ -78,7 +80,7 @@ class DiagnosePage:
             if last is None:
                 ui.label("Not diagnosed yet: which physical effect does this model lack?")
             else:
-                await self._show_found(last)
+                await self._show_found(await service.read(Job, f"/jobs/{last.id}"))
 
     async def _diagnose(self) -> None:
         await self._ask(f"/models/{self._model}/diagnose", {})
@@ -115,7 +117,7 @@ class DiagnosePage:
                     self._studio.service, result.effect, job.payload["takes"],
                     before=result.parent, after=result.model,
                 )  # fmt: skip
-                ui.timer(0.0, partial(view.show, next(iter(result.where), None)), once=True)
+                soon(partial(view.show, next(iter(result.where), None)))
 
     async def _show_found(self, job: Job) -> None:
         try:
@@ -154,11 +156,11 @@ class DiagnosePage:
                 _listed([f"{sentence}." for sentence in found.not_shown])
         ui.link("Report with pictures", f"../v1/jobs/{job}/report", new_tab=True).classes("studio-link")
         if view is not None:
-            ui.timer(0.0, partial(view.show, found.clearest_rotation), once=True)
+            soon(partial(view.show, found.clearest_rotation))
 
     async def _named(self, found: MissingEffects, named: NamedEffect) -> EffectView:
         """What it is and how sure, beside the picture that shows it."""
-        models = await self._studio.service.read(list[Model], "/models", reverse=True)
+        models = await self._studio.service.every(Model, "/models", subject=self._subject, reverse=True)
         child = next((each for each in models if _has_gained(each, found, named)), None)
         with ui.element("section").classes("finding finding-named"):
             heading(2, f"{named.effect} on {', '.join(named.where)}")

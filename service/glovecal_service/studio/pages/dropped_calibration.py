@@ -39,7 +39,9 @@ class DroppedCalibration:
             heading(2, self._file[1])
             self._sentence = ui.label("").classes("finding-sentence").props('role="status"')
             with ui.row().classes("choices"):
-                self._subject = ui.input("Whose calibration", value=whose, autocomplete=list(about.people))
+                self._subject = ui.input(
+                    "Whose calibration", value=whose, autocomplete=list(about.people.names)
+                )
                 self._layout = ui.select(seen.layouts, value=seen.layout, label="Glove")
                 self._hand = ui.select(["right", "left"], value=seen.hand, label="Hand")
                 main_act("Import the calibration", self._import)

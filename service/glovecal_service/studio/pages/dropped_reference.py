@@ -67,10 +67,8 @@ class DroppedReference:
                     )
                 if joined is not None:
                     ui.label("It is imported together with the readings.")
-                elif about.people:
-                    self._subject = ui.select(
-                        list(about.people), value=person, label="Person", on_change=self._other_person
-                    )
+                elif about.people.names:
+                    self._subject = about.people.select("Person", person, lambda _: self._other_person())
                     self._take = ui.select({}, label="Take", on_change=self._say_when).classes("choice")
                     self._act = main_act("Attach to the take", self._attach)
                 else:

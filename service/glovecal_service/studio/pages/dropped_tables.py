@@ -87,7 +87,7 @@ class FilesOfOneShape:
                 self._subject = ui.input(
                     "Whose takes",
                     value=USUAL_NAME if about.is_simulated else about.person or USUAL_NAME,
-                    autocomplete=list(about.people),
+                    autocomplete=list(about.people.names),
                 )
                 self._act = main_act("Import", self._import)
             with ui.expansion("Columns: how they are read").classes("preview-columns") as self._columns:

@@ -12,6 +12,7 @@ from glovecal_service.rest.effect.answer import CatalogueEffect, SchematicView
 from glovecal_service.studio.findings.schematic_view import schematic_view
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.pages.own_expression import OwnExpression
+from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal, Service
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -48,7 +49,7 @@ def add(studio: Studio) -> None:
                 heading(2, "An effect of your own")
                 if model := await around.model(studio.service):
                     await OwnExpression(studio, model.id).build()
-            ui.timer(0.0, partial(_draw, studio.service, pictures), once=True)
+            soon(partial(_draw, studio.service, pictures))
 
 
 def _second_sentence(effect: CatalogueEffect) -> str:

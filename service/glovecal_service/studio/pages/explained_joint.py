@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from nicegui import ui
 from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError, QueryRefused
 from glovecal_service.studio.hand.hand_view import HandView
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.strips.live_values import AngleList, LiveTerms
 from glovecal_service.studio.studio import Studio
 
@@ -22,7 +22,7 @@ class ExplainedJoint:
         self._chosen: str | None = None
         self._lists: list[AngleList] = []
         self._terms = LiveTerms(label=f"Terms of an angle of glove {glove}")
-        self._timer = ui.timer(EVERY_S, self._ask, active=False)
+        self._timer = again(EVERY_S, self._ask, active=False)
         self._terms.on("close", lambda: self._choose(None))
         view.on_rotation(lambda rotation: self._choose(None if rotation == self._chosen else rotation))
 

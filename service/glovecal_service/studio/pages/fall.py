@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
@@ -14,7 +15,7 @@ from glovecal_models.comparison.where.answer import WhereItFails
 from glovecal_models.improvement.answer import EffectAdded, Improved
 from glovecal_models.improvement.fall.answer import ErrorFall
 from glovecal_service.plain import read
-from glovecal_service.rest.job.answer import Job, JobFacts
+from glovecal_service.rest.job.answer import Job, JobFacts, JobRow
 from glovecal_service.rest.model.answer import Model, ReplayView
 from glovecal_service.studio.amounts import made_of
 from glovecal_service.studio.charts.chart import FallChart
@@ -22,6 +23,7 @@ from glovecal_service.studio.hand.hand_view import HandView, Replay, side_button
 from glovecal_service.studio.heading import act, heading
 from glovecal_service.studio.hidden_walk import HiddenWalk
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.repeating import again, soon
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -60,7 +62,7 @@ class FallPage:
         self._watch = JobWatch(self._studio, self._finished)
         self._shown = ui.element("div").classes("findings")
         await self._show()
-        ui.timer(EVERY_S, self._look)
+        again(EVERY_S, self._look)
 
     async def _show(self) -> None:
         line = (await self._service.read(list[Model], f"/models/{self._model}/lineage"))[::-1]
@@ -107,17 +109,18 @@ class FallPage:
         """Why a step of this line was undone."""
         ids = {each.id for each in self._line}
         found = []
-        for job in await self._service.read(list[Job], "/jobs", subject=self._subject):
-            if job.state != "done":
-                continue
+        for job in await self._service.every(JobRow, "/jobs", subject=self._subject, state="done"):
             if job.kind == "improve":
-                walked = read(Improved, job.result)
+                walked = read(Improved, await self._result(job))
                 if ids & {step.model for step in walked.steps}:
                     found += [item.sentence for item in walked.undone]
             elif job.kind == "add_effect" and job.payload.get("model") in ids:
-                tried = read(EffectAdded, job.result)
+                tried = read(EffectAdded, await self._result(job))
                 found += [] if tried.added else [tried.sentence]
         return list(dict.fromkeys(found))
+
+    async def _result(self, job: JobRow) -> dict[str, Any] | None:
+        return (await self._service.read(Job, f"/jobs/{job.id}")).result
 
     # Before and after
 
@@ -142,7 +145,7 @@ class FallPage:
             replay = Replay(views[0], views[1])
             side_buttons(*views)
             ui.label("Grey: predicted. Green, translucent: measured. Red: from fingertip to fingertip.")
-        ui.timer(0.0, partial(self._replay, line, list(takes), replay, sentence), once=True)
+        soon(partial(self._replay, line, list(takes), replay, sentence))
 
     async def _replay(
         self, line: Sequence[Model], takes: list[str], replay: Replay, sentence: ui.label
@@ -188,7 +191,7 @@ class FallPage:
             await self._grow_on()
             return
         ids = {each.id for each in self._line}
-        for job in await self._service.read(list[Job], "/jobs", subject=self._subject, only_unfinished=True):
+        for job in await self._service.every(JobRow, "/jobs", subject=self._subject, only_unfinished=True):
             own = job.payload.get("model") in ids or job.kind == "improve"
             if job.kind in CHANGES and own:
                 self._grow(job)

@@ -12,7 +12,8 @@ from starlette.concurrency import run_in_threadpool
 
 from glovecal_client.errors import ClientError
 from glovecal_service.rest.glove.answer import GloveView
-from glovecal_service.rest.subject.answer import Subject
+from glovecal_service.studio.person_choice import People
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.studio import Studio
 
@@ -28,30 +29,23 @@ class GloveAndWearer:
         self._word: ui.label
 
     async def build(self, subject: str | None = None) -> None:
-        names = await self._subjects()
+        self._people = await People.of(self._studio.service)
         states = await _states(self._studio)
         newest = sorted(self._gloves, key=lambda name: (name in states, self._gloves[name].last_seen_at))
         with ui.element("div").classes("capture-fields"):
             self._glove = ui.select(
                 list(self._gloves), value=newest[-1], label="Glove", on_change=self._changed
             ).classes("choice")
-            wearer = subject or self._gloves[newest[-1]].subject
-            self._subject = (
-                ui.select(
-                    names,
-                    value=wearer if wearer in names else None,
-                    label="Subject",
-                    with_input=True,
-                    new_value_mode="add-unique",
-                )
-                .props('hint="A new name, with Enter, adds a subject."')
-                .classes("choice")
-            )
+            wearer = subject or self._gloves[newest[-1]].subject or ""
+            wearer = wearer if await self._people.has(wearer) else ""
+            self._people = self._people.and_also(wearer)
+            self._subject = self._people.select("Subject", wearer or None, may_be_new=True)
+            self._subject.props('hint="A new name, with Enter, adds a subject."')
         with ui.row().classes("glove-head"):
             self._word = ui.label("").classes("state-word").props('role="status"')
             self._sentence = ui.label("")
         await self._look()
-        ui.timer(WORD_EVERY_S, self._look)
+        again(WORD_EVERY_S, self._look)
 
     @property
     def glove(self) -> str:
@@ -70,17 +64,14 @@ class GloveAndWearer:
     def subject(self) -> str:
         return str(self._subject.value or "").strip().lower()
 
-    async def _subjects(self) -> list[str]:
-        return [each.name for each in await self._studio.service.read(list[Subject], "/subjects")]
-
     async def put_on(self, wearing: str | None = None) -> None:
         """Tell the service who wears the glove, and in which wearing; a new subject is added. Raises
         Refusal."""
         if not self.subject:
             raise Refusal(422, "Choose a subject, or type a new name.")
-        known = await self._subjects()
+        people = await People.of(self._studio.service)
         glove = self._gloves[self.glove]
-        if self.subject not in known:
+        if not await people.has(self.subject):
             await self._studio.service.post("/subjects", {"name": self.subject, "hand": self.hand})
         if wearing is not None or glove.subject != self.subject:
             body = {"subject": self.subject, "wearing": wearing or glove.wearing}
@@ -98,7 +89,7 @@ class GloveAndWearer:
     async def _changed(self, event: ValueChangeEventArguments) -> None:
         wearer = self._gloves[str(event.value)].subject
         if wearer:
-            self._subject.set_value(wearer)
+            self._people.choose(self._subject, wearer)
         await self._look()
 
 

@@ -159,7 +159,7 @@ class GloveCard:
         if glove is None or not glove.layout:
             return
         query = {"subject": glove.subject, "layout": glove.layout, "hand": glove.known_hand}
-        found = await self._studio.service.read(list[Model], "/models", **query) if glove.subject else []
+        found = await self._studio.service.every(Model, "/models", **query) if glove.subject else []
         if not found:
             self._offer_calibration(glove.subject)
             return

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.job.answer import JobRow
 from glovecal_service.studio.amounts import moment, seconds
 from glovecal_service.studio.paged_list import PagedList
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.shell import page, result_link, shell
 from glovecal_service.studio.studio import Studio
 from glovecal_service.studio.table import cell, row_head, table
@@ -23,12 +24,12 @@ def add(studio: Studio) -> None:
     async def jobs() -> None:
         async with shell(studio, "jobs", "Jobs"):
             ui.add_head_html('<link rel="stylesheet" href="/studio/static/findings.css">')
-            every = PagedList(studio.service, Job, "/jobs", _show, what="jobs", at_once=AT_ONCE)
+            every = PagedList(studio.service, JobRow, "/jobs", _show, what="jobs", at_once=AT_ONCE)
             await every.build()
-            ui.timer(EVERY_S, every.look)
+            again(EVERY_S, every.look)
 
 
-async def _show(jobs: list[Job]) -> None:
+async def _show(jobs: list[JobRow]) -> None:
     with table("Jobs, the newest first", HEADS):
         for job in jobs:
             with ui.element("tr"):

@@ -15,6 +15,7 @@ from glovecal_service.studio.chosen import Chosen
 from glovecal_service.studio.glove_state import GloveState
 from glovecal_service.studio.next_steps import connect_or_try, next_steps
 from glovecal_service.studio.pages.glove_card import GloveCard
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import Refusal
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -53,7 +54,7 @@ class LivePage:
             connect_or_try()
             await next_steps(self._studio.service, about)
         await self._look()
-        ui.timer(EVERY_S, self._look)
+        again(EVERY_S, self._look)
 
     async def _look(self) -> None:
         try:

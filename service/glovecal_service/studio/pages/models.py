@@ -21,6 +21,7 @@ from glovecal_service.studio.paged_list import PagedList
 from glovecal_service.studio.pages.gloves_table import gloves_table
 from glovecal_service.studio.pages.model_parts import ModelParts
 from glovecal_service.studio.pages.personal_data import PersonalData
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import refusals
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -62,7 +63,7 @@ class ModelsPage:
             "Import a model", suffixes=".safetensors", largest=self._studio.largest_file,
             take=self._import, tell=self._notice.set_text,
         ).button.props("outline no-caps").classes("studio-target page-acts")  # fmt: skip
-        ui.timer(EVERY_S, self._list.look)
+        again(EVERY_S, self._list.look)
 
     async def _show(self, models: list[Model]) -> None:
         self._notice.set_text("" if models else "No model here.")

@@ -14,6 +14,7 @@ from glovecal_service.studio.findings.candidate_table import bar_key, candidate_
 from glovecal_service.studio.findings.effect_view import EffectView
 from glovecal_service.studio.heading import main_act
 from glovecal_service.studio.job_watch import JobWatch
+from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal, refusals
 from glovecal_service.studio.studio import Studio
 
@@ -50,7 +51,7 @@ class OwnExpression:
         self._verdict = ui.label("").classes("effect-sentence").props('role="status"')
         self._result = ui.element("div")
         self._watch = JobWatch(self._studio, self._finished)
-        ui.timer(0.0, self._begin, once=True)
+        soon(self._begin)
 
     async def _begin(self) -> None:
         await self._show_names()
@@ -59,8 +60,8 @@ class OwnExpression:
     async def _show_names(self) -> None:
         """Sensors and context columns of the model's takes."""
         model = await self._service.read(ModelInFull, f"/models/{self._model}")
-        takes = await self._service.read(list[Take], "/takes", subject=model.subject)
-        context = {f"c.{name}" for take in takes if take.layout == model.layout for name in take.context}
+        takes = await self._service.every(Take, "/takes", subject=model.subject, layout=model.layout)
+        context = {f"c.{name}" for take in takes for name in take.context}
         sensors = dict.fromkeys(sensor for each in model.rotations for sensor in each.sensors)
         self._names.set_text(f"Recorded here: {', '.join([*sensors, *sorted(context)])}.")
 

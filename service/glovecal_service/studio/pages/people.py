@@ -13,6 +13,7 @@ from glovecal_client.site.roles import Role
 from glovecal_service.rest.access.answer import Key, Person
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import act, heading, main_act
+from glovecal_service.studio.person_choice import People
 from glovecal_service.studio.service import Service, refusals, warn_long
 from glovecal_service.studio.table import cell, row_head, table
 
@@ -27,16 +28,16 @@ MAY = {
 class ScopeChoice:
     """Fields for a role and whose takes and models are seen."""
 
-    def __init__(self, subjects: list[str]) -> None:
+    def __init__(self, subjects: People) -> None:
         self._role = ui.select(
             {role: f"{role}: {MAY[role]}" for role in get_args(Role)}, value="viewer", label="Role"
         ).classes("choice")
-        self._subjects = ui.select(subjects, multiple=True, label="Of whom (nobody: of everybody)")
-        self._subjects.classes("choice")
+        self._of = subjects
+        self._subjects = subjects.select("Of whom (nobody: of everybody)", [], multiple=True)
 
     def show(self, row: Key) -> None:
         self._role.set_value(row.role)
-        self._subjects.set_value(row.subjects or [])
+        self._of.choose(self._subjects, *(row.subjects or []))
 
     @property
     def body(self) -> dict[str, object]:
@@ -47,7 +48,7 @@ class ScopeChoice:
 class PeopleTable:
     """Who logs in with a password; ``changed`` is awaited after each change."""
 
-    def __init__(self, service: Service, subjects: list[str], changed: Callable[[], Awaitable[None]]) -> None:
+    def __init__(self, service: Service, subjects: People, changed: Callable[[], Awaitable[None]]) -> None:
         self._service, self._changed = service, changed
         heading(2, "People")
         ui.label(
@@ -75,7 +76,7 @@ class PeopleTable:
         self._chosen: Person | None = None
 
     async def look(self) -> None:
-        people = await self._service.read(list[Person], "/people")
+        people = await self._service.every(Person, "/people")
         self._rows.clear()
         with self._rows:
             if not people:

@@ -7,8 +7,9 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from glovecal_service.rest.subject.answer import Erasure, Subject
+from glovecal_service.rest.subject.answer import Erasure
 from glovecal_service.studio.heading import act, heading, quiet_act
+from glovecal_service.studio.person_choice import People
 from glovecal_service.studio.service import Service, refusals
 
 
@@ -20,18 +21,17 @@ class PersonalData:
 
     async def build(self, person: str) -> None:
         """``person``: whom the page is about, "" for nobody."""
-        names = await self._names()
-        if not names:
+        people = await People.of(self._service)
+        if not people.names:
             return
+        person = person if await people.has(person) else people.names[0]
         with ui.element("section").classes("tree hand-sizes").props('aria-label="Personal data"'):
             heading(2, "Personal data")
             ui.label(
                 "Everything that is kept of a person as one zip file: takes, recordings, videos, models, "
                 "jobs and who changed what, with a README. Erasing removes all of that."
             )
-            self._subject = ui.select(
-                names, value=person if person in names else names[0], label="Whose", on_change=self._show
-            ).classes("choice")
+            self._subject = people.and_also(person).select("Whose", person, self._show)
             self._acts = ui.element("div").classes("page-acts")
             self._confirming = ui.element("div").classes("page-acts")
             with self._confirming:
@@ -41,9 +41,6 @@ class PersonalData:
                 quiet_act("Keep", self._show)
             self._told = ui.element("div").props('role="status"')
         self._show()
-
-    async def _names(self) -> list[str]:
-        return [each.name for each in await self._service.read(list[Subject], "/subjects")]
 
     @property
     def _name(self) -> str:
@@ -77,8 +74,8 @@ class PersonalData:
         with refusals(lambda sentence: self._tell([sentence])):
             erased = await self._service.ask(Erasure, "/erasures", {"subject": self._name})
             self._tell(erased.sentences)
-            names = await self._names()
-            self._subject.set_options(names, value=next(iter(names), None))
+            people = await People.of(self._service)
+            people.choose(self._subject, *people.names[:1])
             self._show()
 
     def _tell(self, sentences: list[str]) -> None:

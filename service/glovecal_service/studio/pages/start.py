@@ -15,6 +15,7 @@ from glovecal_service.studio.hidden_walk import walk_section
 from glovecal_service.studio.job_watch import JobWatch
 from glovecal_service.studio.live_test import LiveTest
 from glovecal_service.studio.next_steps import command_to_copy
+from glovecal_service.studio.repeating import again
 from glovecal_service.studio.service import refusals, warn_long
 from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
@@ -65,7 +66,7 @@ class StartPage:
                 )
                 ui.link("Keys, people and changes", "/access").classes("studio-link")
         await self._look()
-        ui.timer(EVERY_S, self._look)
+        again(EVERY_S, self._look)
 
     # A simulated glove
 

@@ -102,7 +102,7 @@ class TakeView:
         if self._fits(self._model):
             return self._model and self._model.id
         query = {"subject": own.subject, "layout": own.layout, "hand": own.known_hand}
-        models = await self._studio.service.read(list[Model], "/models", **query)
+        models = await self._studio.service.every(Model, "/models", **query)
         return next((each.id for each in models if each.active), None)
 
     def _fits(self, model: Model | None) -> bool:

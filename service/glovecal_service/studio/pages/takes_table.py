@@ -12,6 +12,7 @@ from glovecal_service.rest.take.answer import CheckView, Take
 from glovecal_service.studio.amounts import moment
 from glovecal_service.studio.heading import heading
 from glovecal_service.studio.paged_list import PagedList
+from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal, Service
 from glovecal_service.studio.table import cell, row_head, table
 
@@ -50,7 +51,7 @@ class TakesTable:
                     gaps = cell("…")
                     cell(_measured(take))
                     places.append((take, gaps, ui.element("td").classes("take-quality")))
-        ui.timer(0.0, partial(self._judge, places), once=True)
+        soon(partial(self._judge, places))
 
     async def _judge(self, places: Sequence[tuple[Take, TextElement, ui.element]]) -> None:
         for take, gaps, place in places:

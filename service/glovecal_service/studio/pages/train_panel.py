@@ -12,7 +12,7 @@ from glovecal_models.calibration.answer import Trained
 from glovecal_models.improvement.answer import STOPPED, Improved, ImprovedSoFar
 from glovecal_models.presentation.document import counted
 from glovecal_service.plain import read
-from glovecal_service.rest.job.answer import Job, JobFacts
+from glovecal_service.rest.job.answer import Job, JobFacts, JobRow
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.amounts import degrees
 from glovecal_service.studio.charts.chart import FallChart
@@ -94,10 +94,11 @@ class TrainPanel:
 
     async def _took(self) -> dict[str, str]:
         """By method: how long its last training took on this computer, and of how much."""
-        jobs = await self._studio.service.read(list[Job], "/jobs", text="train", limit=MOST_LOOKED_AT)
+        done = {"kind": "train", "state": "done", "limit": MOST_LOOKED_AT}
+        jobs = await self._studio.service.read(list[JobRow], "/jobs", **done)
         took: dict[str, str] = {}
         for job in jobs:
-            if job.kind == "train" and job.state == "done" and job.took_s is not None:
+            if job.took_s is not None:
                 took.setdefault(
                     str(job.payload.get("method")), f" Last time: {job.took_s:.0f} s, {job.about}."
                 )

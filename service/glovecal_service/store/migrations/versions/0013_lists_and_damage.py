@@ -9,7 +9,7 @@ down_revision = "0012"
 NAME = sa.String(64)
 INDICES = {
     "takes": (("created_at", "id"), ("subject", "created_at", "id")),
-    "models": (("created_at", "id"), ("subject", "created_at", "id")),
+    "models": (("subject", "layout", "hand"), ("created_at", "id"), ("subject", "created_at", "id")),
     "recordings": (
         ("requested_at", "id"),
         ("glove", "requested_at", "id"),
@@ -31,6 +31,7 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("table", "id", name="pk_damages"),
     )
     op.create_index("ix_damages_found_at", "damages", ["found_at"])
+    op.drop_index("ix_models_subject_layout", "models")
     for table, indices in INDICES.items():
         for columns in indices:
             op.create_index(f"ix_{table}_{'_'.join(columns)}", table, list(columns))
