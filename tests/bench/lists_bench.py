@@ -21,9 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from large_store import Size, fill
 from realtime_support import free_endpoint, part_of_service
-from studio_support import running_browser
 
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.serve import real_time, web
@@ -51,6 +49,8 @@ def main() -> None:
     parser.add_argument("--store", type=Path, help="keep the store in this folder; one that is there is used")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
+    from large_store import Size, fill  # not at the top: the service's processes import this module too
+
     pin_blas_to_one_thread()
     size = Size().divided(100 if options.smoke else 10 if options.quick else 1)
     with tempfile.TemporaryDirectory(prefix="glovecal-bench-") as folder:
@@ -139,6 +139,8 @@ def _pages(url: str) -> Iterator[tuple[str, float]]:
     if shutil.which("chromium") is None:
         print("Chromium is not installed (Debian: apt-get install chromium): pages were not measured.")
         return
+    from studio_support import running_browser
+
     with running_browser() as browser:
         for name in PAGES:
             taken = []

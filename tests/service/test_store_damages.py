@@ -131,5 +131,5 @@ def test_a_row_that_an_index_does_not_find_is_told(sqlite_settings: Settings) ->
         )
     with Store.open(sqlite_settings) as store:
         assert searched(store)[0].sentence.startswith(
-            "table takes or its index is damaged (row 1 missing from index "
+            "table takes or an index of it is damaged (row 1 missing from index "
         )

@@ -101,7 +101,7 @@ class Damages:
         for table in PROTECTED:
             met: set[str] = set()
             for rows in self._parts(table):
-                found = []
+                damages = []
                 for row in rows:
                     if sentence := self._sentence(table, row):
                         id = _key(table, row)
@@ -109,8 +109,8 @@ class Damages:
                         subject = row._mapping.get("subject")
                         subject = subject if isinstance(subject, str) and subject.isprintable() else None
                         if self.note(table.name, id, sentence, subject):
-                            found.append(Damage(table.name, id, sentence, now()))
-                yield found
+                            damages.append(Damage(table.name, id, sentence, now()))
+                yield damages
             if sentence := self._damaged_index(table):
                 met.add(INDEX)
                 if self.note(table.name, INDEX, sentence):

@@ -196,6 +196,7 @@ takes = Table(
     Column("created_at", UtcTime, nullable=False),
     Column("row_sha256", SHA256, nullable=False, server_default=""),
     UniqueConstraint("subject", "layout", "frames_sha256"),
+    Index(None, "recording"),
     Index(None, "created_at", "id"),
     Index(None, "subject", "created_at", "id"),
 )

@@ -186,7 +186,7 @@ def test_ready_says_what_does_not_work(shared: RestClient, monkeypatch: pytest.M
     def damaged(*_: Any) -> None:
         raise StoreDamaged("the database file is damaged; restore a backup")
 
-    monkeypatch.setattr("glovecal_service.store.database.Revision.__call__", damaged)
+    monkeypatch.setattr("glovecal_service.store.subjects.Subjects.count", damaged)
     with pytest.raises(Refused, match="damaged") as refused:
         shared.get("/health/ready")
     assert refused.value.status == 503

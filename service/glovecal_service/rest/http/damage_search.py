@@ -23,7 +23,7 @@ _log = logging.getLogger("glovecal.rest")
 
 
 async def search_for_damage(store: Store) -> None:
-    """Once an hour, without end; what was found is looked at again each minute."""
+    """Once an hour, without end; what is known is looked at again each minute."""
     await asyncio.sleep(FIRST_AFTER_S)
     while True:
         next_at = time.monotonic() + EVERY_S
@@ -38,10 +38,10 @@ async def _search(store: Store) -> None:
     steps, again_at = store.damages.search(), time.monotonic() + AGAIN_EVERY_S
     while True:
         began = time.monotonic()
-        found = await run_in_threadpool(_next, steps)
-        if found is None:
+        damages = await run_in_threadpool(_next, steps)
+        if damages is None:
             return
-        for damage in found:
+        for damage in damages:
             event = Event("damage", {"sentence": damage.sentence}, table=damage.table, id=damage.id)
             _log.error("%s", event)
         if time.monotonic() > again_at:

@@ -127,7 +127,7 @@ def _no_realtime(seen_s_ago: float | None) -> str:
 
 def _check_database(store: Store) -> None:
     try:
-        store.revision()
+        store.subjects.count()
     except StoreError as error:
         raise Problem(503, "not-ready", f"the database does not work: {error}") from error
 
@@ -147,10 +147,10 @@ def _check_artifacts(store: Store, data: Path) -> str:
 
 def _problems(store: Store) -> list[str]:
     try:
-        found, total = store.damages.list(limit=MOST_DAMAGES)
+        known, total = store.damages.list(limit=MOST_DAMAGES)
     except StoreError as error:
         return [str(error)]
-    told = [damage.sentence for damage in found]
+    told = [damage.sentence for damage in known]
     more = total - len(told)
     return told + ([f"{more} more are damaged; the service's log names each"] if more else [])
 

@@ -8,7 +8,7 @@ down_revision = "0012"
 
 NAME = sa.String(64)
 INDICES = {
-    "takes": (("created_at", "id"), ("subject", "created_at", "id")),
+    "takes": (("recording",), ("created_at", "id"), ("subject", "created_at", "id")),
     "models": (("subject", "layout", "hand"), ("created_at", "id"), ("subject", "created_at", "id")),
     "recordings": (
         ("requested_at", "id"),
