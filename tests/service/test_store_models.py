@@ -1,6 +1,7 @@
 """Models: immutable, verified at each load, activated and rolled back in one step."""
 
 import itertools
+import random
 import threading
 from contextlib import suppress
 
@@ -235,3 +236,25 @@ def test_a_hand_is_never_read_by_a_model_of_the_other(store):
         assert {model.id for model in active.values() if model is not None} == listed
 
     holds()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_which_of_many_are_active_is_told_as_of_each(anna, seed):
+    """Whichever is activated in whichever order: of one hand, of the other, of takes that do not say."""
+    choose = random.Random(seed)
+    anna.subjects.create("ben")
+    models = [
+        anna.models.add(
+            b"%d" % number, subject=choose.choice(["anna", "ben"]), layout=choose.choice(["one", "two"]),
+            method="linear", parent=None, facts={}, hand=choose.choice(["left", "right", None]),
+        )
+        for number in range(12)
+    ]  # fmt: skip
+    for _ in range(10):
+        anna.models.activate(choose.choice(models).id)
+        pairs = {(each.subject, each.layout) for each in models}
+        active = {each.id for pair in pairs for each in anna.models.active_of_each_hand(*pair)}
+        assert anna.models.active_among(models) == (active, [])
+        assert anna.models.count_active() == len(active)
+        own = {each.id for each in models if each.subject == "ben"}
+        assert anna.models.count_active("ben") == len(own & active)

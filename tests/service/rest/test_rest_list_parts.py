@@ -17,6 +17,8 @@ from glovecal_models.takes.take import Take
 from glovecal_service.rest.http.list_part import USUAL_LIMIT
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
+from glovecal_service.store.actor import Actor
+from glovecal_service.store.list_part import ListPart
 
 EVERY = [f"fist {number}" for number in range(7)]
 
@@ -139,6 +141,27 @@ def test_filters_leave_no_part_short(settings: Settings, client: RestClient) -> 
     middle = client.get("/takes")[3]["created_at"]
     assert names(client, since=middle) == [*EVERY[3:], *names(client)[7:]]
     assert names(client, until=middle) == EVERY[:3]
+
+
+def test_who_sees_some_people_pages_through_theirs_alone(settings: Settings, client: RestClient) -> None:
+    """No part is short because of rows of others, and none of them is counted."""
+    with Store.open(settings) as store:
+        store.subjects.create("ben")
+        for number in range(5):
+            add_take(store, 60 + number, f"own {number}", "ben")
+            add_take(store, 70 + number, f"other {number}")
+            store.jobs.create("train", {}, subject="ben")
+        seen = store.acting_as(Actor(name="ben", subjects=frozenset({"ben"})))
+        for list_part in (seen.takes.page, seen.jobs.page):
+            pages = [list_part(ListPart(limit=2))]
+            while pages[-1].after is not None:
+                pages.append(list_part(ListPart(limit=2, after=pages[-1].after)))
+            assert [len(page.records) for page in pages] == [2, 2, 1]
+            assert {page.total for page in pages} == {5}
+            assert {record.subject for page in pages for record in page.records} == {"ben"}
+        assert seen.takes.page(ListPart(limit=2), subject="anna").records == []
+        assert [record.name for record in seen.subjects.page(ListPart(limit=1)).records] == ["ben"]
+        assert seen.models.count_active() == 0
 
 
 def test_a_damaged_row_stops_no_part(settings: Settings, client: RestClient) -> None:

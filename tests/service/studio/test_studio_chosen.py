@@ -11,6 +11,7 @@ from studio_support import Open, serious
 
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
+from glovecal_service.studio.person_choice import MOST_OFFERED
 
 pytestmark = pytest.mark.needs_chromium
 
@@ -80,3 +81,20 @@ def test_long_lists_are_filtered_and_turned(opened: Open, settings: Settings, ki
     page.get_by_role("button", name="Newer").click()
     expect(rows).to_have_count(40)
     assert serious(page) == []
+
+
+def test_one_of_many_people_is_looked_for_by_typing(opened: Open, settings: Settings) -> None:
+    with Store.open(settings) as store:
+        for number in range(MOST_OFFERED + 20):
+            store.subjects.create(f"zoe-{number:03d}")
+    seen = opened("takes")
+    page, last = seen.page, f"zoe-{MOST_OFFERED + 19:03d}"
+    person = page.get_by_role("banner").get_by_label("Person")
+    person.click()
+    expect(page.get_by_role("option", name="zoe-000", exact=True)).to_be_visible()
+    person.fill(last[-3:])
+    page.get_by_role("option", name=last, exact=True).click()
+    expect(page).to_have_url(re.compile(rf"who={last}$"))
+    expect(page.get_by_role("banner").get_by_label("Person")).to_have_value(last)
+    assert serious(page) == []
+    assert seen.complaints == []

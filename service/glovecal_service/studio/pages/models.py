@@ -27,7 +27,7 @@ from glovecal_service.studio.shell import page, shell
 from glovecal_service.studio.studio import Studio
 
 EVERY_S = 2.0
-AT_ONCE = 60
+AT_ONCE = 30
 
 
 def add(studio: Studio) -> None:

@@ -16,7 +16,7 @@ from glovecal_service.studio.repeating import soon
 from glovecal_service.studio.service import Refusal, Service
 from glovecal_service.studio.table import cell, row_head, table
 
-AT_ONCE = 40
+AT_ONCE = 20
 """Each is read whole to be judged."""
 HEADS = ("Take", "Subject", "Wearing", "Recorded", "Length", "Frames", "Gaps", "Measured", "Quality")
 FEW_SENTENCES = 2
