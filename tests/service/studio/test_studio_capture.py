@@ -229,7 +229,7 @@ def test_a_free_recording_with_its_reference(opened: Open, address: str, referen
 
 
 def test_what_a_diagnosis_wants_is_recorded_next(opened: Open, address: str) -> None:
-    every = [asked(address, f"jobs/{job['id']}") for job in asked(address, "jobs", kind="diagnose")]
+    every = [asked(address, f"jobs/{job['id']}") for job in asked(address, "jobs")]
     jobs = [job for job in every if (job["result"] or {}).get("next_take")]
     wanted = jobs[0]["result"]["next_take"]
     page = opened(f"capture?proposal={jobs[0]['id']}").page

@@ -18,6 +18,7 @@ from studio_support import Open, serious
 from glovecal_models.calibration.artifact import dump, model_id, read_manifest
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
+from glovecal_service.studio.pages.takes_table import AT_ONCE
 
 pytestmark = pytest.mark.needs_chromium
 SMALL = dump(replace(model_with(HYSTERESIS, CREEP), layout=replace(LAYOUT, name="three-bends-elsewhere")))
@@ -99,7 +100,7 @@ def test_takes_have_their_quality_and_gloves_their_layouts(
     with Store.open(settings) as store:
         store.gloves.seen("seen-once", {"layout": LAYOUT.name, "simulated": True})
     page = opened("takes").page
-    takes = httpx.get(f"{address}/v1/takes").json()
+    takes = httpx.get(f"{address}/v1/takes", params={"reverse": True, "limit": AT_ONCE}).json()
     rows = page.get_by_role("region", name="Takes and their quality").locator("tbody tr")
     expect(rows).to_have_count(len(takes))
     for take in takes[:2]:

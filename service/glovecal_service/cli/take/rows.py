@@ -37,19 +37,16 @@ def stored_takes(service: RestClient, **query: str | None) -> list[Take]:
 
 def named_take(service: RestClient, wanted: str) -> Take:
     """The stored take that is meant. Raises Refusal that lists what could be meant."""
-    return named_takes(service, [wanted])[0]
+    newest = {"reverse": True, "limit": MOST_ALIKE}
+    alike = read(list[Take], service.get("/takes", newest | {"text": wanted[:LONGEST_TEXT]}))
+    rows = alike if _meant(alike, wanted) else read(list[Take], service.get("/takes", newest))
+    return find_take(rows[::-1], wanted)
 
 
-def named_takes(service: RestClient, wanted: Sequence[str]) -> list[Take]:
+def named_takes(service: RestClient, wanted: Iterable[str]) -> list[Take]:
     """Each stored take that is meant, once."""
-    rows: dict[str, Take] = {}
-    for name in wanted:
-        query = {"text": name[:LONGEST_TEXT], "reverse": True, "limit": MOST_ALIKE}
-        found = read(list[Take], service.get("/takes", query))
-        if not found:  # what could be meant
-            found = read(list[Take], service.get("/takes", {"reverse": True, "limit": MOST_ALIKE}))
-        rows |= {row.id: row for row in found}
-    return find_takes(list(rows.values()), wanted)
+    takes = [named_take(service, name) for name in wanted]
+    return list({take.id: take for take in takes}.values())
 
 
 def print_takes(rows: Sequence[Take], *, empty: str) -> None:
@@ -60,18 +57,21 @@ def print_takes(rows: Sequence[Take], *, empty: str) -> None:
 
 def find_take(rows: Sequence[Take], wanted: str) -> Take:
     """The one that is meant. Raises Refusal that lists what could be meant."""
-    for row in rows:
-        if row.id == wanted:
-            return row
-    found = [row for row in rows if row.name == wanted]
-    if not found and len(wanted) >= SHORTEST_BEGINNING:
-        found = [row for row in rows if row.id.startswith(wanted)]
+    found = _meant(rows, wanted)
     if len(found) == 1:
         return found[0]
     if found:
         raise Refusal(f"{len(found)} takes are called {wanted!r}: {_listed(found)}; give the id of one")
     meant = did_you_mean(wanted, (row.name for row in rows))
     raise Refusal(f"there is no take {wanted!r}; {meant}. List them: glovecal take list")
+
+
+def _meant(rows: Sequence[Take], wanted: str) -> list[Take]:
+    """By its id, its name or the beginning of its id."""
+    named = [row for row in rows if row.id == wanted] or [row for row in rows if row.name == wanted]
+    if named or len(wanted) < SHORTEST_BEGINNING:
+        return named
+    return [row for row in rows if row.id.startswith(wanted)]
 
 
 def find_takes(rows: Sequence[Take], wanted: Iterable[str]) -> list[Take]:
