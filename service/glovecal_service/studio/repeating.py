@@ -26,7 +26,7 @@ def soon(look: Look) -> ui.timer:
 class _Repeated:
     def __init__(self, look: Look) -> None:
         self._look = look
-        self._told = ""
+        self._complaint = ""
 
     async def __call__(self) -> None:
         if is_session_over():
@@ -35,8 +35,8 @@ class _Repeated:
             done = self._look()
             if isawaitable(done):
                 await done
-            self._told = ""
+            self._complaint = ""
         except Refusal as refusal:
-            if not is_session_over() and str(refusal) != self._told:
-                self._told = str(refusal)
-                warn(self._told)
+            if not is_session_over() and str(refusal) != self._complaint:
+                self._complaint = str(refusal)
+                warn(self._complaint)

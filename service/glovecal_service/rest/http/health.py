@@ -150,9 +150,10 @@ def _problems(store: Store) -> list[str]:
         known, total = store.damages.list(limit=MOST_DAMAGES)
     except StoreError as error:
         return [str(error)]
-    told = [damage.sentence for damage in known]
-    more = total - len(told)
-    return told + ([f"{more} more are damaged; the service's log names each"] if more else [])
+    more = total - len(known)
+    return [damage.sentence for damage in known] + (
+        [f"{more} more are damaged; the service's log names each"] if more else []
+    )
 
 
 pages = APIRouter(include_in_schema=False)
