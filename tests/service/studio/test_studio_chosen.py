@@ -91,7 +91,6 @@ def test_one_of_many_people_is_looked_for_by_typing(opened: Open, settings: Sett
     page, last = seen.page, f"zoe-{MOST_OFFERED + 19:03d}"
     person = page.get_by_role("banner").get_by_label("Person")
     person.click()
-    expect(page.get_by_role("option", name="zoe-000", exact=True)).to_be_visible()
     person.fill(last[-3:])
     page.get_by_role("option", name=last, exact=True).click()
     expect(page).to_have_url(re.compile(rf"who={last}$"))
