@@ -16,7 +16,7 @@ from glovecal_client.errors import NoAnswer, QueryRefused
 from glovecal_client.keys import GloveKeys, service_alive_key
 from glovecal_client.session import open_client, open_router
 from glovecal_client.wire.pose import Pose, PoseFlag
-from glovecal_service.rest.job.answer import Job
+from glovecal_service.rest.job.answer import JobRow
 from glovecal_service.settings import Settings
 from glovecal_service.studio.glove_state import SENTENCES, Word, glove_state
 from glovecal_service.studio.live_feed import LiveFeeds
@@ -161,5 +161,6 @@ def test_a_status_that_nobody_stands_behind_changes_nothing() -> None:
     ],
 )
 def test_a_finished_job_leads_to_its_result(kind: str, result: Any, address: str | None) -> None:
-    link = result_link(Job.model_construct(id="j1", kind=kind, result=result))
+    model = (result or {}).get("model")
+    link = result_link(JobRow.model_construct(id="j1", kind=kind, has_result=bool(result), model=model))
     assert (link and link[1]) == address
