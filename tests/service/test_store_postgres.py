@@ -107,7 +107,7 @@ def test_a_server_that_hangs_is_told_at_once_and_a_long_statement_is_waited_for(
     with Store.open(settings) as store:
         store.subjects.create("anna")
         with store.database.read() as connection:
-            assert connection.scalar(text("SELECT 7 FROM pg_sleep(5)")) == 7
+            assert connection.scalar(text("SELECT 7 FROM pg_sleep(3)")) == 7
         postmaster = psutil.Process(
             int((own_postgres.folder / "data" / "postmaster.pid").read_text().split()[0])
         )
