@@ -89,7 +89,7 @@ def router_config(
 
 def _each(endpoints: Sequence[str]) -> list[str]:
     """One text may name several, separated by commas."""
-    return [each.strip() for text in endpoints for each in text.split(",") if each.strip()]
+    return [each.strip() for text in endpoints for each in text.split(",")]
 
 
 def _certificates(member: Member | None, *sides: str) -> dict[str, Any]:
