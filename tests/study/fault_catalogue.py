@@ -183,11 +183,16 @@ CATALOGUE = (
         ),
     ),
     CatalogueFault(
-        16, "database damaged", "every changed row of models found; the restore is told, and takes 1 min",
+        16, "database damaged",
+        "every changed row found by the search for damage, and when it is used; a row that an index no longer "
+        "finds too; the restore is told, and takes 1 min",
         (
             SERVICE + "test_store_row_damage.py"
             "::test_a_change_of_any_column_is_noticed_and_names_table_and_row",
             SERVICE + "test_store_damaged.py::test_no_overwritten_bytes_make_another_model_active",
+            SERVICE + "test_store_damages.py"
+            "::test_a_changed_row_of_any_table_is_found_once_and_forgotten_when_it_is_as_before",
+            SERVICE + "test_store_damages.py::test_a_row_that_an_index_does_not_find_is_told",
         ),
         "how long a restore takes",
     ),
