@@ -184,8 +184,8 @@ CATALOGUE = (
     ),
     CatalogueFault(
         16, "database damaged",
-        "every changed row found by the search for damage, and when it is used; a row that an index no longer "
-        "finds too; the restore is told, and takes 1 min",
+        "every changed row found by the search for damage, and when it is used; a row that an index no "
+        "longer finds too; the restore is told, and takes 1 min",
         (
             SERVICE + "test_store_row_damage.py"
             "::test_a_change_of_any_column_is_noticed_and_names_table_and_row",
