@@ -87,6 +87,7 @@ def test_a_glove_with_an_unknown_mask(emulate) -> None:
         (b"login: \r\nlogin: ", "another device: at 115200 baud it sends text such as 'login:'"),
         (b"12:34:56:07:0S" + bytes(range(40)), "a CyberGlove III left streaming"),
         (b"\xff\x80\x12", "most likely the baud rate is wrong"),
+        (b"S?S", "sends back what is written to it"),
     ],
 )
 def test_sentences(came: bytes, words: str) -> None:

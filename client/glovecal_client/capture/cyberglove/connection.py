@@ -32,7 +32,7 @@ def kind_of(tries: Sequence[Heard]) -> Kind:
     noisy = [item for item in tries if item.came]
     if not noisy:
         return "silent"
-    if all(item.came == item.sent for item in noisy):
+    if all(item.came in 8 * item.sent for item in noisy):  # of a try before, where the port is slow
         return "echo"
     if any(_is_text(item.came) for item in noisy):
         return "text"
