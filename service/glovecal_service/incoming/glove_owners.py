@@ -11,7 +11,9 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterable
-from threading import RLock
+from contextlib import suppress
+from queue import SimpleQueue
+from threading import RLock, Thread
 
 import zenoh
 
@@ -45,12 +47,13 @@ class GloveOwners:
         """Of the others, by glove and process."""
         self._highest: dict[str, int] = {}
         """Term ever seen of a glove."""
-        self._mine: dict[str, tuple[int, object]] = {}
-        """Term and token."""
-        self._lost: list[object] = []
-        """Tokens to take back, on a thread that may."""
+        self._mine: dict[str, int] = {}
+        """Terms."""
+        self._to_say: SimpleQueue[tuple[str, int, bool] | None] = SimpleQueue()
+        """Glove, term, and whether it is had or no more: frames do not wait until that is said."""
+        self._speaker = Thread(target=self._say, name="owners", daemon=True)
         self._lost_at: dict[str, float] = {}
-        self._token: object | None = None
+        self._token: zenoh.LivelinessToken | None = None
         hear = zenoh.handlers.Callback
         tokens = session.liveliness()
         self._subscribers = [
@@ -72,11 +75,14 @@ class GloveOwners:
     def close(self) -> None:
         """Leave all gloves to the others."""
         with self._lock:
-            tokens = [token for _, token in self._mine.values()] + self._lost
             self._mine.clear()
-            self._lost.clear()
-        for each in filter(None, [self._token, *tokens, *self._subscribers]):
-            each.undeclare()  # type: ignore[attr-defined]
+        if self._token is not None:
+            self._token.undeclare()
+        self._to_say.put(None)
+        if self._speaker.ident is not None:
+            self._speaker.join()
+        for each in self._subscribers:
+            each.undeclare()
 
     def is_mine(self, glove: str) -> bool:
         """Whether this process speaks for the glove, with frames or without."""
@@ -110,36 +116,47 @@ class GloveOwners:
             return glove in self._mine or (glove not in self._terms and self._is_next(glove, among))
 
     def take(self, glove: str) -> tuple[int, bool]:
-        """Take a glove over: its term, and whether another process had it before."""
+        """Take a glove over: its term, and whether another process had it before. Never waits."""
         with self._lock:
             had = self._mine.get(glove)
             if had is not None:
-                return had[0], False
+                return had, False
             before = self._highest.get(glove, 0)
-            term = max(before + 1, int(time.time())) % _TERMS_END
+            term = self._mine[glove] = max(before + 1, int(time.time())) % _TERMS_END
             self._note_highest(glove, term)
-        token = self._session.liveliness().declare_token(term_key(self._site, self._instance, glove, term))
-        with self._lock:
-            self._mine[glove] = term, token
+            if self._speaker.ident is None:
+                self._speaker.start()
+            self._to_say.put((glove, term, True))
             self._yield_if_overruled(glove)
         return term, before > 0
 
     def leave(self, glove: str) -> None:
         """Of no use here any more."""
         with self._lock:
-            _, token = self._mine.pop(glove, (0, None))
-        if token is not None:
-            token.undeclare()  # type: ignore[attr-defined]
+            term = self._mine.pop(glove, None)
+            if term is not None:
+                self._to_say.put((glove, term, False))
 
     def kept(self, gloves: Iterable[str]) -> set[str]:
-        """Those that this process still has; says of the others that it has them no more."""
+        """Those that this process still has."""
         with self._lock:
-            kept = {glove for glove in gloves if glove in self._mine}
-            lost = [*self._lost]
-            self._lost.clear()
-        for token in lost:
-            token.undeclare()  # type: ignore[attr-defined]
-        return kept
+            return {glove for glove in gloves if glove in self._mine}
+
+    def _say(self) -> None:
+        """On a thread of its own: zenoh may take as long as a frame does."""
+        tokens: dict[str, zenoh.LivelinessToken] = {}
+        while (item := self._to_say.get()) is not None:
+            glove, term, is_had = item
+            token = tokens.pop(glove, None)
+            with suppress(zenoh.ZError):  # of a session that was closed, whose tokens are gone with it
+                if is_had:
+                    key = term_key(self._site, self._instance, glove, term)
+                    tokens[glove] = self._session.liveliness().declare_token(key)
+                if token is not None:
+                    token.undeclare()
+        for token in tokens.values():
+            with suppress(zenoh.ZError):
+                token.undeclare()
 
     def _is_next(self, glove: str, among: str = "") -> bool:
         mine = _weight(self._instance, glove)
@@ -190,11 +207,11 @@ class GloveOwners:
             del self._terms[glove]
 
     def _yield_if_overruled(self, glove: str) -> None:
-        term, token = self._mine.get(glove, (0, None))
+        term = self._mine.get(glove)
         others = [(other, process) for process, other in self._terms.get(glove, {}).items()]
-        if token is not None and others and max(others) > (term, self._instance):
+        if term is not None and others and max(others) > (term, self._instance):
             del self._mine[glove]
-            self._lost.append(token)
+            self._to_say.put((glove, term, False))
             self._lost_at[glove] = time.monotonic()
             self.version += 1
 

@@ -106,6 +106,8 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
         seen.page.on("request", lambda request: seen.asked.append(request.url))
         seen.page.goto(f"{at}/studio/{name}")
         seen.page.wait_for_selector("h1")
+        # what is clicked before is lost: the service does not know the page yet
+        seen.page.wait_for_function("!window.socket || window.did_handshake === true")
         return seen
 
     yield open_page
