@@ -16,23 +16,18 @@ from glovecal_service.studio.pages.models import AT_ONCE
 pytestmark = pytest.mark.needs_chromium
 
 
-def models(address: str, subject: str) -> list[dict]:
-    return httpx.get(f"{address}/v1/models", params={"subject": subject}).json()
-
-
-def test_a_version_is_activated_and_rolled_back_by_keyboard(opened: Open, address: str) -> None:
-    subject = next(each["subject"] for each in httpx.get(f"{address}/v1/models").json() if each["parent"])
-    own = models(address, subject)
-    own = [each for each in own if each["layout"] == next(item for item in own if item["parent"])["layout"]]
-    active, other = (next(each["id"] for each in own if each["active"] is flag) for flag in (True, False))
+def test_a_version_is_activated_and_rolled_back_by_keyboard(
+    opened: Open, address: str, settings: Settings
+) -> None:
+    with Store.open(settings) as store:  # the newest are on the page's first part
+        active = store_model(store, "walker", degrees_per_count=0.3)
+        other = store_model(store, "walker", degrees_per_count=0.2, activate=False)
     page = opened("models").page
-    page.get_by_label("Filter models").fill(subject)  # the newest are shown, and other tests make some
     page.locator(f'[data-model="{other}"] button', has_text="Activate").press("Enter")
     expect(page.locator(f'[data-model="{other}"] .state-word')).to_have_text("active")
-    layout = own[0]["layout"]
-    now = [each for each in models(address, subject) if each["layout"] == layout]
+    now = httpx.get(f"{address}/v1/models", params={"subject": "walker"}).json()
     assert [each["id"] for each in now if each["active"]] == [other]
-    tree = page.locator("section.tree", has_text=f"{subject}, {layout}")
+    tree = page.locator("section.tree", has_text="walker, ")
     tree.get_by_role("button", name="Return to the model before").press("Enter")
     expect(page.locator(f'[data-model="{active}"] .state-word')).to_have_text("active")
 
