@@ -167,6 +167,10 @@ def parse_service_key(key: str) -> str:
     return check_identifier(parts[3], "service instance")
 
 
+LAST_TERM = (1 << 32) - 1
+"""A pose has room for 32 bits."""
+
+
 def term_key(site: str, instance: str, glove: str, term: int) -> str:
     """Liveliness token of a service process that has a glove."""
     return service_alive_key(site, instance).removesuffix("alive") + f"has/{glove}/{term}"
@@ -183,8 +187,8 @@ def parse_term_key(key: str) -> tuple[str, str, int]:
     if len(parts) != 7 or (parts[0], parts[2], parts[4]) != (ROOT, "service", "has"):
         raise BadName(f"key: {key!r} is not {ROOT}/<site>/service/<instance>/has/<glove>/<term>")
     term = parts[6]
-    if not (term.isascii() and term.isdigit() and len(term) <= 10):
-        raise BadName(f"key: the term of {key!r} is no number")
+    if not (term.isascii() and term.isdigit() and len(term) <= 10 and int(term) <= LAST_TERM):
+        raise BadName(f"key: the term of {key!r} is no number of 32 bits")
     return check_identifier(parts[3], "service instance"), GloveKeys(parts[1], parts[5]).glove, int(term)
 
 

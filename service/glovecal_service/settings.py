@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 _ENDPOINT = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):[0-9]{1,5}\Z")
+SQLITE_FILE = "glovecal.sqlite3"
 _HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
 LONGEST_ISSUER = 255
 _LONGEST_SECRET = 4096
@@ -172,7 +173,7 @@ class Settings(BaseSettings):
         from sqlalchemy import URL
 
         # no text: "?" and "%" of a folder's name mean something else in a URL
-        return URL.create("sqlite", database=str(self.data.resolve() / "glovecal.sqlite3"))
+        return URL.create("sqlite", database=str(self.data.resolve() / SQLITE_FILE))
 
     @property
     def artifacts_folder(self) -> Path:

@@ -11,7 +11,8 @@ import io
 import os
 import secrets
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
 from typing import IO, BinaryIO, Literal, cast
@@ -163,16 +164,13 @@ def encrypt_file(path: Path, *, grows: bool) -> bool:
     """
     if is_kept_encrypted(path):
         return False
-    about, unfinished = path.stat(), path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
-    try:
-        with path.open("rb") as plain, _created_as(unfinished, grows=grows) as file:
-            shutil.copyfileobj(plain, file, 1 << 20)
-            finish_file(file)
-        os.utime(unfinished, ns=(about.st_atime_ns, about.st_mtime_ns))
-        move_over(unfinished, path, durably=True)
-    except BaseException:
-        unfinished.unlink(missing_ok=True)
-        raise
+    with (
+        _in_place_of(path) as unfinished,
+        path.open("rb") as plain,
+        _created_as(unfinished, grows=grows) as file,
+    ):
+        shutil.copyfileobj(plain, file, 1 << 20)
+        finish_file(file)
     return True
 
 
@@ -191,22 +189,28 @@ def pack_log(path: Path) -> bool:
     """
     if is_packed(path):
         return False
-    with _decrypted_file(path) as log:
-        about, unfinished = path.stat(), path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
-        try:
-            with create_whole(unfinished) as file:
-                for block in packed_log.packed_blocks(log):
-                    file.write(block)
-                finish_file(file)
-            log.seek(0)
-            if _sha256(log) != _read_back(unfinished):
-                raise DamagedFile(f"{path.name} cannot be packed: it is not read back as it is")
-            os.utime(unfinished, ns=(about.st_atime_ns, about.st_mtime_ns))
-            move_over(unfinished, path, durably=True)
-        except BaseException:
-            unfinished.unlink(missing_ok=True)
-            raise
+    with _in_place_of(path) as unfinished, _decrypted_file(path) as log:
+        with create_whole(unfinished) as file:
+            for block in packed_log.packed_blocks(log):
+                file.write(block)
+            finish_file(file)
+        log.seek(0)
+        if _sha256(log) != _read_back(unfinished):
+            raise DamagedFile(f"{path.name} cannot be packed: it is not read back as it is")
     return True
+
+
+@contextmanager
+def _in_place_of(path: Path) -> Iterator[Path]:
+    """A file that takes the place and the times of ``path`` once it is whole, and goes if that fails."""
+    about, unfinished = path.stat(), path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
+    try:
+        yield unfinished
+        os.utime(unfinished, ns=(about.st_atime_ns, about.st_mtime_ns))
+        move_over(unfinished, path, durably=True)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
 
 
 def _read_back(path: Path) -> str:

@@ -19,6 +19,7 @@ import zenoh
 
 from glovecal_client.errors import BadName
 from glovecal_client.keys import (
+    LAST_TERM,
     all_services,
     all_terms,
     parse_service_key,
@@ -31,7 +32,6 @@ SETTLED_WITHIN_S = 2.0
 AGAIN_AFTER_S = 1.0
 """A glove that another took over is not taken back at once: both may be right by what they know."""
 MOST_GLOVES = 4096
-_TERMS_END = 1 << 32
 
 
 class GloveOwners:
@@ -122,7 +122,7 @@ class GloveOwners:
             if had is not None:
                 return had, False
             before = self._highest.get(glove, 0)
-            term = self._mine[glove] = max(before + 1, int(time.time())) % _TERMS_END
+            term = self._mine[glove] = min(max(before + 1, int(time.time())), LAST_TERM)
             self._note_highest(glove, term)
             if self._speaker.ident is None:
                 self._speaker.start()

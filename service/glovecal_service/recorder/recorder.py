@@ -97,8 +97,8 @@ class Recorder:
         owners: GloveOwners,
     ) -> None:
         self._owners = owners
+        self._keeper = _keeper(settings)
         self._place = _place(settings)
-        self._keeper = f"{socket.gethostname()}:{settings.recordings_folder.resolve()}"
         self._session = session
         self._settings = settings
         self._open_store = open_store
@@ -380,7 +380,10 @@ class Recorder:
         self._settling.pop(record.id, None)
         self._pauses.pop(record.id, None)
         account = {} if live is None else live.account()
-        self._update(store, record.id, state="failed", sentence=problem, **account)
+        try:
+            self._update(store, record.id, state="failed", sentence=problem, **account)
+        except TakenOver as error:
+            _log.warning("recording %s failed here: %s", record.name, error)
 
     def _report(self, store: Store) -> None:
         for id, live in list(self._live.items()):
@@ -411,10 +414,14 @@ def _sound(recordings: Callable[[], list[RecordingRecord]]) -> list[RecordingRec
         return error.sound
 
 
+def _keeper(settings: Settings) -> str:
+    """Computer and folder, as ``KEEPER`` has them."""
+    return f"{socket.gethostname()}:{settings.recordings_folder.resolve()}"
+
+
 def _place(settings: Settings) -> str:
     """What the names of all recorders of a data folder begin with."""
-    folder = f"{socket.gethostname()}:{settings.recordings_folder.resolve()}"
-    return f"recorder-{hashlib.sha256(folder.encode()).hexdigest()[:8]}-"
+    return f"recorder-{hashlib.sha256(_keeper(settings).encode()).hexdigest()[:8]}-"
 
 
 def _begin_elsewhere(record: RecordingRecord) -> dict[str, Any] | None:

@@ -26,8 +26,9 @@ from sqlalchemy import Connection, delete, func, insert, select, text
 from glovecal_client.operating_system import move_over, sync_file
 from glovecal_client.private_files import PRIVATE_FOLDER, open_private
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.settings import Settings
+from glovecal_service.settings import SQLITE_FILE, Settings
 from glovecal_service.store import tables
+from glovecal_service.store.belongings import artifacts_of
 from glovecal_service.store.blobs import SHA256_NAME, full_disk_named
 from glovecal_service.store.data_folder_lock import LOCK, WHO
 from glovecal_service.store.database import Database
@@ -46,7 +47,6 @@ _OF_ONE_RUN = ("artifacts", "artifacts-cache", "fits", "owners")
 _UNFINISHED = (".writing-", ".unfinished", ".encrypting")
 _ROWS_AT_ONCE = 500
 _LARGEST_MANIFEST = 1 << 28
-_LINKED = "restores nothing outside of its folder"
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def restore_backup(source: Path, settings: Settings) -> Backup:
             unfinished.mkdir(mode=PRIVATE_FOLDER, parents=True)
             manifest = _unpack(source, unfinished)
             if settings.database is not None:
-                _fill_server(unfinished / "glovecal.sqlite3", settings)
+                _fill_server(unfinished / SQLITE_FILE, settings)
             if data.exists():
                 data.rmdir()
             move_over(unfinished, data)
@@ -156,10 +156,9 @@ def _write(store: Store, settings: Settings, file: IO[bytes], folder: Path) -> N
 
 def _files(settings: Settings) -> Iterator[Path]:
     """Of the data folder: what is not in the database and not of one run."""
-    database = settings.data.resolve() / "glovecal.sqlite3"
     for path in sorted(settings.data.rglob("*")):
         within = path.relative_to(settings.data).parts
-        if within[0] in _OF_ONE_RUN or path.name in _OF_A_PROCESS or path.name.startswith(database.name):
+        if within[0] in _OF_ONE_RUN or path.name in _OF_A_PROCESS or path.name.startswith(SQLITE_FILE):
             continue
         if any(part in path.name for part in _UNFINISHED) or path.is_symlink() or not path.is_file():
             continue
@@ -314,12 +313,12 @@ def _unpack_one(
 
 def _place(folder: Path, name: str) -> Path:
     if name == DATABASE:
-        return folder / "glovecal.sqlite3"
+        return folder / SQLITE_FILE
     if name.startswith(ARTIFACTS) and SHA256_NAME.match(name.removeprefix(ARTIFACTS)):
         return folder / name
     place = folder / name.removeprefix(FILES)
     if not name.startswith(FILES) or not place.resolve().is_relative_to(folder.resolve()):
-        raise BadInput(f"{name!r} does not belong there: a backup {_LINKED}")
+        raise BadInput(f"{name!r} does not belong there: a backup restores nothing outside of its folder")
     return place
 
 
@@ -329,8 +328,7 @@ def _artifacts_named(database: Database) -> set[str]:
         named = set(connection.scalars(select(tables.models.c.id)))
         for take in connection.execute(select(tables.takes.c.artifact, tables.takes.c.facts)):
             facts = _plain(take._mapping)["facts"]
-            earlier = facts.get("history", []) if isinstance(facts, dict) else []
-            named |= {take.artifact, *(str(each["artifact"]) for each in earlier)}
+            named.update(artifacts_of(take.artifact, facts if isinstance(facts, dict) else {}))
     return {name for name in named if SHA256_NAME.match(name)}
 
 

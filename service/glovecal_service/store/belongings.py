@@ -4,7 +4,7 @@ removes it, so what is found here is found by both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -89,10 +89,10 @@ class Belongings:
         return [{"wearing": wearing, "glove": glove} for wearing, glove in dict.fromkeys(rows)]
 
 
-def artifacts_of(take: TakeRecord) -> list[str]:
-    """Of its arrays as they are, and as they were with earlier references: sha256, the newest first."""
-    earlier = [str(one["artifact"]) for one in take.facts.get("history", [])]
-    return list(dict.fromkeys([take.artifact, *earlier[::-1]]))
+def artifacts_of(artifact: str, facts: Mapping[str, Any]) -> list[str]:
+    """Of a take's arrays as they are, and as they were with earlier references: sha256, the newest first."""
+    earlier = [str(one["artifact"]) for one in facts.get("history", [])]
+    return list(dict.fromkeys([artifact, *earlier[::-1]]))
 
 
 def recording_files(settings: Settings, id: str) -> list[Path]:

@@ -281,7 +281,9 @@ def _mentions(job: JobRecord, name: str, ids: set[str]) -> bool:
 
 def _files(of: Belongings, audit: SubjectAudit, settings: Settings) -> list[dict[str, str]]:
     """Of the subject, also those whose rows were removed before."""
-    artifacts = {artifact for take in of.takes for artifact in artifacts_of(take)} | audit.artifacts
+    artifacts = {
+        artifact for take in of.takes for artifact in artifacts_of(take.artifact, take.facts)
+    } | audit.artifacts
     artifacts |= {model.id for model in of.models}
     paths = [path for id in audit.ids for path in recording_files(settings, id)]
     paths += [settings.videos_folder / f"{id}.zip" for id in audit.ids]

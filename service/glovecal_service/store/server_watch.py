@@ -22,12 +22,12 @@ from glovecal_service.store.errors import StoreUnavailable
 LATE_AFTER_S = 2.0
 ANSWERED_WITHIN_S = 2
 """By a server that is there; psycopg takes whole seconds, from 2 on."""
-LOOK_EVERY_S = 0.25
+LOOK_EVERY_S, ENDS_AFTER_S = 0.25, 60.0
 ASKED_AGAIN_AFTER_S = 2.0
 
 
 class ServerWatch:
-    """Of one engine with psycopg connections. Its thread runs while somebody waits."""
+    """Of one engine with psycopg connections. Its thread ends when nobody has asked for a minute."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -73,13 +73,16 @@ class ServerWatch:
         self._connections.discard(connection)
 
     def _look(self) -> None:
+        asked_at = time.monotonic()
         while True:
             time.sleep(LOOK_EVERY_S)
             with self._lock:
-                if not self._waiting:
+                now = time.monotonic()
+                asked_at = now if self._waiting else asked_at
+                if now - asked_at > ENDS_AFTER_S:
                     self._is_looking = False
                     return
-                late = min(self._waiting.values()) < time.monotonic() - LATE_AFTER_S
+                late = min(self._waiting.values(), default=now) < now - LATE_AFTER_S
             if late and not self._answers():
                 self._hung_at = time.monotonic()
                 for connection in list(self._connections):

@@ -124,7 +124,7 @@ class SubjectArchive:
         of = self._of
         for take in of.takes:
             yield f"takes/{take.id}/about.json", iter([_json(take)])
-            for number, artifact in enumerate(artifacts_of(take), 1):
+            for number, artifact in enumerate(artifacts_of(take.artifact, take.facts), 1):
                 yield f"takes/{take.id}/take-{number}.safetensors", self._artifact(artifact)
             video = self._settings.videos_folder / f"{take.id}.zip"
             if video.is_file():
