@@ -31,11 +31,12 @@ def free_port() -> int:
     return int(free_endpoint().rpartition(":")[2])
 
 
-def start(data: Path, endpoint: str, port: int) -> subprocess.Popen[str]:
+def start(data: Path, endpoint: str, port: int, **more: str) -> subprocess.Popen[str]:
     environment = os.environ | {
         "GLOVECAL_DATA": str(data),
         "GLOVECAL_ZENOH": endpoint,
         "GLOVECAL_PORT": str(port),
+        **more,
     }
     return subprocess.Popen(
         [sys.executable, "-m", "glovecal_service.cli.command", "serve"],
@@ -209,6 +210,27 @@ def taken(port: int) -> socket.socket | None:
         return socket.create_server(("127.0.0.1", port))
     except OSError:
         return None
+
+
+def test_as_many_processes_share_the_gloves_as_are_asked_for(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    more = {"GLOVECAL_REALTIME": "2", "GLOVECAL_RECORDERS": "2"}
+    process = start(tmp_path / "data", endpoint, free_port(), **more)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("Glovecal is running")
+        with open_client([endpoint]) as session:
+
+            def there() -> bool:
+                tokens = session.liveliness().get(all_services("lab"), timeout=5.0)
+                names = [str(reply.ok.key_expr).split("/")[3] for reply in tokens if reply.ok is not None]
+                kinds = sorted(name.partition("-")[0] for name in names)
+                return kinds == ["realtime", "realtime", "recorder", "recorder"]
+
+            eventually(there, "two of each are there")
+    finally:
+        process.kill()
+        process.communicate(timeout=120)
 
 
 def test_what_cannot_start_is_tried_more_and_more_rarely_and_says_why(
