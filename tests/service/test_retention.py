@@ -95,7 +95,7 @@ def test_old_jobs_go_with_their_results_and_the_newest_answers_stay(
         connection.execute(text("UPDATE jobs SET sentence = 'other' WHERE id = :id"), {"id": damaged})
     swept = sweep(store, settings)
     assert swept.jobs == 3
-    assert str(swept).endswith("steps of jobs that are over, 3 jobs with their results")
+    assert str(swept).endswith("steps of jobs that are over, 3 jobs with what was found")
     page = store.jobs.page(ListPart(limit=20))
     assert {job.id for job in page.records} == set(kept)
     assert len(page.damaged) == 1
@@ -127,7 +127,7 @@ def test_ledgers_that_are_left_alone_are_packed(sqlite_settings: Settings) -> No
         assert not sweep(store, sqlite_settings), "it was written to a moment ago"
         at = os.stat(ledger.path).st_mtime - 7200
         os.utime(ledger.path, (at, at))
-        assert "1 ledgers of recordings were packed" in str(sweep(store, sqlite_settings))
+        assert "packed: 1 ledger of recordings" in str(sweep(store, sqlite_settings))
         assert not sweep(store, sqlite_settings)
         assert ledger.path.stat().st_size < len(content) / 5
         with open_kept(ledger.path) as file:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from glovecal_client.private_files import keep_private
+from glovecal_models.presentation.document import counted
 from glovecal_service.cli.terminal.connection import settings_of_environment
 from glovecal_service.cli.terminal.printing import Refusal, err, out
 from glovecal_service.store.backup import Backup, check_backup, make_backup, restore_backup
@@ -51,13 +52,14 @@ def restore(file: File) -> None:
 
 
 def _tell(backup: Backup, what: str) -> None:
-    counts = ", ".join(f"{backup.rows[name]} {name}" for name in ("subjects", "takes", "models", "jobs"))
+    rows = (counted(backup.rows[f"{noun}s"], noun) for noun in ("subject", "take", "model", "job"))
+    files = f"{counted(backup.artifacts, 'artifact')}, {counted(backup.files, 'other file')}"
     out.print(
-        f"{what}: as of {backup.written_at:%Y-%m-%d %H:%M:%S} UTC, {counts}, {backup.artifacts} artifacts, "
-        f"{backup.files} other files, {backup.size_bytes / 1e6:.1f} MB.",
+        f"{what}: as of {backup.written_at:%Y-%m-%d %H:%M:%S} UTC, {', '.join(rows)}, {files}, "
+        f"{backup.size_bytes / 1e6:.1f} MB.",
         soft_wrap=True,
     )
     for problem in backup.problems:
         err.print(problem, style="yellow", soft_wrap=True)
     if backup.problems:
-        raise Refusal(f"{len(backup.problems)} things in it are not as they were written")
+        raise Refusal(f"not as it was written: {counted(len(backup.problems), 'thing')} in it")

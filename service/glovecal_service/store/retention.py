@@ -21,6 +21,7 @@ from pathlib import Path
 
 from glovecal_client.encryption.kept_file import is_packed, pack_log
 from glovecal_client.errors import ClientError
+from glovecal_models.presentation.document import counted
 from glovecal_service.plain import reason_of
 from glovecal_service.settings import Settings
 from glovecal_service.store.database import now
@@ -49,9 +50,10 @@ class Swept:
         return bool(self.files or self.job_steps or self.jobs or self.packed)
 
     def __str__(self) -> str:
-        files = f"{self.files} files of {self.size_bytes / 1e6:.1f} MB"
-        jobs = f"{self.job_steps} steps of jobs that are over, {self.jobs} jobs with their results"
-        packed = f"; {self.packed} ledgers of recordings were packed" if self.packed else ""
+        files = f"{counted(self.files, 'file')} of {self.size_bytes / 1e6:.1f} MB"
+        steps = f"{counted(self.job_steps, 'step')} of jobs that are over"
+        jobs = f"{steps}, {counted(self.jobs, 'job')} with what was found"
+        packed = f"; packed: {counted(self.packed, 'ledger')} of recordings" if self.packed else ""
         return f"{files}, {jobs}{packed}"
 
 

@@ -12,7 +12,7 @@ def test_a_backup_is_made_tried_and_restored_into_another_folder(run: Run, tmp_p
     file, artifacts = tmp_path / "today.backup", tmp_path / "objects"
     made = run("backup", "make", file)
     assert made.code == 0, made.err
-    assert "1 subjects, 0 takes, 0 models" in made.out
+    assert "1 subject, 0 takes, 0 models" in made.out
     assert file.stat().st_mode & 0o077 == 0, "for its owner only"
     assert "exists already" in run("backup", "make", file).said
     assert "can be restored" in run("backup", "check", file).out
