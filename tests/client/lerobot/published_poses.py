@@ -14,6 +14,8 @@ from glovecal_client import GloveKeys, Pose, PoseFlag, encode_pose, open_client
 NAMES = ("I_MCP", "I_PIP", "M_PIP")
 MODEL = "ab" * 32
 DEGREES = (30.0, 45.0, 60.0)
+HOLD_S = 2.0
+"""``hold_s`` where a test follows a glove: a busy computer may be silent for a second."""
 POSE = Pose(
     1, 7, 0, 0, np.array(DEGREES, np.float32), np.ones(3, np.float32), np.zeros(3, np.uint8), MODEL
 )  # fmt: skip

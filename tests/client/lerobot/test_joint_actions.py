@@ -23,7 +23,7 @@ from lerobot_teleoperator_glovecal.joint_actions import (
     SummedRotations,
 )
 from loopback import eventually, free_endpoint
-from published_poses import DEGREES, NAMES, POSE, Glove
+from published_poses import DEGREES, HOLD_S, NAMES, POSE, Glove
 
 from glovecal_client import Pose, PoseFlag, open_router
 from glovecal_client.wire.pose import RotationFlag
@@ -186,7 +186,7 @@ def glove(endpoint: str) -> Iterator[Glove]:
 def teleoperator(endpoint: str, glove: Glove) -> Iterator[GlovecalTeleoperator]:
     radians = {f"{name}.pos": JointAction({name: math.pi / 180}, low=-0.3, high=1.8) for name in NAMES}
     config = GlovecalTeleoperatorConfig(
-        glove="right", actions=radians, connect=endpoint, hold_s=0.5, ramp_s=0.5, allow_simulated=True
+        glove="right", actions=radians, connect=endpoint, hold_s=HOLD_S, ramp_s=0.5, allow_simulated=True
     )
     teleoperator = GlovecalTeleoperator(config)
     teleoperator.connect()

@@ -18,7 +18,7 @@ import pytest
 from lerobot_teleoperator_glovecal.joint_actions import GloveNotUsable, JointAction
 from lerobot_teleoperator_glovecal.robot_joints import RobotJoints
 from loopback import free_endpoint
-from published_poses import NAMES, POSE, Glove
+from published_poses import HOLD_S, NAMES, POSE, Glove
 from pyarrow import parquet
 
 from glovecal_client import open_router
@@ -29,8 +29,7 @@ from glovecal_models.hand.skeleton import hand_skeleton
 from glovecal_service.exports.robot_hand import mjcf
 from lerobot_teleoperator_glovecal import GlovecalTeleoperator, GlovecalTeleoperatorConfig
 
-TRYING = ("--allow-simulated", "--hold", "1")
-"""A busy computer may be silent for half a second."""
+TRYING = ("--allow-simulated", "--hold", f"{HOLD_S:g}")
 GRIPPER = """
 <mujoco>
   <compiler angle="radian"/>
@@ -113,7 +112,9 @@ def test_another_hand_is_mapped_and_a_faulty_sensor_ends_the_recording(
         monkeypatch.setattr(mujoco_hand.MujocoHand, "send_action", tell)
         words = [str(model), str(folder), "--map", str(mapped), "--connect", endpoint]
         assert mujoco_hand.main([*words, "--seconds", "60", *TRYING]) == 1
-    why = "It ended early: glove right stopped moving the robot after 1 s: a sensor of rotation I_PIP"
+    why = (
+        f"It ended early: glove right stopped moving the robot after {HOLD_S:g} s: a sensor of rotation I_PIP"
+    )
     assert why in capsys.readouterr().err
     rows = rows_of(folder)
     np.testing.assert_allclose(rows["action"][-1], [0.6, 0.3], atol=2e-3)

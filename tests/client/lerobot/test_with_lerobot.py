@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from dataset_v3 import Episode, write_dataset
 from loopback import free_endpoint
-from published_poses import DEGREES, Glove
+from published_poses import DEGREES, HOLD_S, Glove
 
 from glovecal_client import open_router
 
@@ -63,7 +63,7 @@ def endpoint() -> Iterator[str]:
 def test_lerobots_own_loop_follows_and_stops(python: Path, endpoint: str, tmp_path: Path) -> None:
     glove = Glove(endpoint)
     try:
-        command = [str(python), "-I", str(PROGRAM), endpoint]
+        command = [str(python), "-I", str(PROGRAM), endpoint, str(HOLD_S)]
         complaints = (tmp_path / "complaints").open("w+")
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=complaints, text=True, env={"HF_HOME": str(tmp_path)}
@@ -83,7 +83,7 @@ def test_lerobots_own_loop_follows_and_stops(python: Path, endpoint: str, tmp_pa
     assert moved["count"] > 10
     assert moved["last"] == {"index.pos": 80.0, "middle.pos": DEGREES[2]}, "90 degrees is above the limit"
     assert ended["kind"] == "GloveNotUsable"
-    assert "glove right stopped moving the robot after 0.2 s: its pose is stale" in ended["why"]
+    assert f"glove right stopped moving the robot after {HOLD_S:g} s: its pose is stale" in ended["why"]
 
 
 def test_lerobots_own_functions_read_the_data_set(python: Path, tmp_path: Path) -> None:

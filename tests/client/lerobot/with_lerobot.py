@@ -1,7 +1,7 @@
 """Runs in an environment with the real LeRobot: finds the plug-in by name, and lets its loop move a robot.
 
-Called with the zenoh endpoint. What LeRobot imports for learning (torch and others, gigabytes of them) is
-stood in for by modules that hold nothing.
+Called with the zenoh endpoint and ``hold_s``. What LeRobot imports for learning (torch and others,
+gigabytes of them) is stood in for by modules that hold nothing.
 """
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
@@ -85,7 +85,7 @@ class Robot:
         return action
 
 
-def main(endpoint: str) -> None:
+def main(endpoint: str, hold_s: str) -> None:
     sys.meta_path.insert(0, StandIns())
     import draccus
     from lerobot.scripts.lerobot_teleoperate import teleop_loop
@@ -101,7 +101,7 @@ def main(endpoint: str) -> None:
     settings = make_dataclass("Settings", [("teleop", TeleoperatorConfig)])
     options = {
         "type": "glovecal", "glove": "right", "connect": endpoint, "actions": json.dumps(actions),
-        "ramp_s": 0, "allow_simulated": "true",
+        "ramp_s": 0, "hold_s": hold_s, "allow_simulated": "true",
     }  # fmt: skip
     words = [f"--teleop.{name}={value}" for name, value in options.items()]
     config = draccus.parse(settings, args=words).teleop
@@ -118,7 +118,8 @@ def main(endpoint: str) -> None:
         first = lambda pair: pair[0]  # noqa: E731
         teleop_loop(teleoperator, robot, 60, first, first, dict, duration=duration)
 
-    loop(1.0)
+    while len(robot.sent) <= 10:
+        loop(1.0)
     print("\n" + json.dumps({"count": len(robot.sent), "last": robot.sent[-1]}), flush=True)
     try:
         loop(None)  # until the glove falls silent
@@ -129,4 +130,4 @@ def main(endpoint: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])
