@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glovecal_models.calibration.fused_processes import ROUNDED_SHARE
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.predictor import BY_RULE, EXTRAPOLATING, TOO_UNCERTAIN, GlovePredictor
 from glovecal_models.covariance.functions import SquaredExponentialArd
@@ -66,6 +67,32 @@ def make_model(seed: int = 0, sizes: tuple[int, ...] = (100,)) -> CalibrationMod
     return CalibrationModel(LAYOUT, "anna", "lmc_gpr", tuple(items), ())
 
 
+@pytest.mark.parametrize("noise", [1.0, 1e-2, 1e-4])
+def test_single_precision_costs_a_variance_a_hundredth_of_its_noise(noise: float) -> None:
+    """The less noise the larger the root, and the more it magnifies rounding: then it stays double."""
+    generator = np.random.default_rng(3)
+    model = make_model(1, (60,))
+    items = []
+    for item in model.rotations:
+        regressor = item.regressor
+        if isinstance(regressor, ProcessRegressor) and isinstance(
+            regressor.covariance, SquaredExponentialArd
+        ):
+            nodes = regressor.nodes * generator.uniform(0.1, 2)
+            gram = regressor.covariance(regressor.theta, nodes, nodes) + noise * np.eye(len(nodes))
+            root = np.linalg.inv(np.linalg.cholesky(gram)).T
+            regressor = replace(regressor, nodes=nodes, variance_root=root, noise_variance=noise)
+        items.append(replace(item, regressor=regressor))
+    model = replace(model, rotations=tuple(items))
+    readings = generator.uniform(20, 235, (50, 18))
+    angles = GlovePredictor(model).predict(readings)
+    for column, item in enumerate(model.rotations):
+        if isinstance(item.regressor, ProcessRegressor):
+            alone = item.regressor.predict(item.correspondence.input_columns(readings, LAYOUT.sensors))
+            found = angles.sd[:, column] ** 2 - item.regressor.noise_variance
+            assert np.abs(found - alone.variance).max() <= ROUNDED_SHARE * noise
+
+
 @pytest.mark.parametrize("sizes", [(100,), (3, 9, 12, 40, 130, 300), (7,)])
 @pytest.mark.parametrize("frames", [1, 5, 16, 300])
 def test_equals_each_regressor_alone(sizes: tuple[int, ...], frames: int) -> None:
@@ -80,7 +107,7 @@ def test_equals_each_regressor_alone(sizes: tuple[int, ...], frames: int) -> Non
         alone = item.regressor.predict(item.correspondence.input_columns(readings, LAYOUT.sensors))
         np.testing.assert_allclose(angles.mean[:, column], alone.mean, atol=1e-9, rtol=0)
         sd = np.sqrt(alone.variance + item.regressor.noise_variance)
-        np.testing.assert_allclose(angles.sd[:, column], sd, atol=1e-9, rtol=0)
+        np.testing.assert_allclose(angles.sd[:, column], sd, atol=1e-4, rtol=0)
         uncertain = np.sqrt(alone.variance) > item.uncertain_above_deg
         np.testing.assert_array_equal(angles.flags[:, column] & TOO_UNCERTAIN > 0, uncertain)
 
@@ -114,7 +141,7 @@ def test_frame_by_frame_equals_all_at_once() -> None:
     for frame in range(0, 700, 70):
         alone = predictor.predict(readings[frame : frame + 1])
         np.testing.assert_allclose(alone.mean[0], together.mean[frame], atol=1e-10)
-        np.testing.assert_allclose(alone.sd[0], together.sd[frame], atol=1e-10)
+        np.testing.assert_allclose(alone.sd[0], together.sd[frame], atol=1e-4)
         np.testing.assert_array_equal(alone.flags[0], together.flags[frame])
 
 

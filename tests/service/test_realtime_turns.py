@@ -25,7 +25,7 @@ from glovecal_service.realtime.glove_lanes import (
 )
 from glovecal_service.realtime.lane_effects import WornGloves
 from glovecal_service.realtime.pose_loop import PoseLoop
-from glovecal_service.realtime.served_model import Pace, ServedModel, ServedModels
+from glovecal_service.realtime.served_model import CAUTION, Pace, ServedModel, ServedModels
 
 MILLISECOND = 1_000_000
 
@@ -131,6 +131,14 @@ def test_pace_starts_cautious_learns_quickly_and_forgives_one_slow_turn() -> Non
     assert pace.frames_within(0.010) == 1
 
 
+def test_pace_learns_from_small_turns_what_a_full_one_costs() -> None:
+    """What a turn costs whatever is in it must not be taken for the cost of each of its frames."""
+    pace = Pace(frame_s=50e-6, turn_s=300e-6)
+    for _ in range(5):
+        pace.observe(1, 2 * 350e-6)  # a computer half as fast as when it was measured
+    assert pace.frames_within(0.010) in (93, 94)
+
+
 @given(st.lists(st.tuples(st.integers(0, 100), st.floats(0, 10)), max_size=50))
 def test_pace_always_lets_something_go_on(turns: list[tuple[int, float]]) -> None:
     pace = Pace()
@@ -143,7 +151,7 @@ class CostlyPace(Pace):
     """A machine that needs 5 ms for a frame of this model; keeps how many frames each turn had."""
 
     def __init__(self) -> None:
-        super().__init__(5e-3)
+        super().__init__(5e-3 / CAUTION)
         self.turns: list[int] = []
 
     def observe(self, frames: int, seconds: float) -> None:

@@ -17,6 +17,9 @@ from glovecal_models.regression.regressor import ProcessRegressor, Regressor
 
 DROPPED_VARIANCE = 1e-9
 """Degrees squared: what is left out of the variance, at most, for fewer columns of its root."""
+ROUNDED_SHARE = 0.01
+"""Of the noise variance: what the variance may lose to 7 digits. It costs half as much: what a frame needs is
+mostly to read the roots of its model, which eight models do not have in the cache at once."""
 LARGEST_REDUCED = 256
 """Larger variance roots stay whole: to reduce one takes the cube of its columns."""
 GROUP_SIZES = (16, 64, 128, 256, 512)
@@ -81,24 +84,23 @@ class FusedProcesses:
         self._parts = _parts(processes, self._nodes_used)
         self._select = np.stack([selections[index][:, at] for index, at in each])
         self._shift = np.array([[processes[index].input_shift[at]] for index, at in each])
-        self._scale = np.array([[processes[index].input_scale[at]] for index, at in each])
-        self._root_relevance = np.array([[_root_relevance(processes[index])[at]] for index, at in each])
+        scale = np.array([[processes[index].input_scale[at]] for index, at in each])
+        self._to_nodes = np.array([[_root_relevance(processes[index])[at]] for index, at in each]) / scale
         self._slope = np.zeros((self._count, len(each)))
         for column, (index, at) in enumerate(each):
-            self._slope[index, column] = processes[index].slope[at]
+            self._slope[index, column] = processes[index].slope[at] / scale[column, 0]
         self._intercept = np.array([[process.intercept] for process in processes])
         self._log_signal = np.array([[[process.theta[0]]] for process in processes])
         self._signal = np.exp(self._log_signal[:, :, 0])
         self._weights = np.zeros((self._count, self._nodes_used, 1))
         for index, process in enumerate(processes):
             self._weights[index, : len(process.weights), 0] = process.weights
-        self._mean_apart = self._variance_nodes < self._nodes_used
-        self._roots = self._stacked([_reduced_root(process) for process in processes])
+        self._roots = self._stacked(processes)
         self._widest = max(root.shape[2] for _, root in self._roots)
 
-    def _stacked(self, roots: Sequence[np.ndarray]) -> list[tuple[slice, np.ndarray]]:
-        """Variance roots of neighbouring processes with similar numbers of columns, the weights beside."""
-        stacked, start = [], 0
+    def _stacked(self, processes: Sequence[ProcessRegressor]) -> list[tuple[slice, np.ndarray]]:
+        """Variance roots of neighbouring processes with similar numbers of columns."""
+        roots, stacked, start = list(map(_reduced_root, processes)), [], 0
         while start < len(roots):
             widths = [root.shape[1] for root in roots[start:]]
             end = next((n for n, width in enumerate(widths) if not _similar(width, widths[:n])), len(widths))
@@ -107,12 +109,8 @@ class FusedProcesses:
                 nodes = min(len(root), self._variance_nodes)
                 stack[index, :nodes, : root.shape[1]] = root[:nodes]
             rows = slice(start, start + end)
-            # hundreds of nodes: a frame costs what reading the root costs; 7 digits do for a variance
-            stacked.append(
-                (rows, stack.astype(np.float32))
-                if self._mean_apart
-                else (rows, np.ascontiguousarray(np.concatenate([stack, self._weights[rows]], axis=2)))
-            )
+            few_digits = all(map(_is_known_in_few_digits, processes[rows], roots[rows]))
+            stacked.append((rows, stack.astype(np.float32) if few_digits else stack))
             start += end
         return stacked
 
@@ -126,22 +124,22 @@ class FusedProcesses:
         frames = columns.shape[1]
         inputs = self._select @ columns
         inputs -= self._shift
-        inputs /= self._scale
         mean = self._slope @ inputs
         mean += self._intercept
-        inputs *= self._root_relevance
+        inputs *= self._to_nodes
         shape = (self._count, frames, self._nodes_used)
         size = self._count * frames * self._nodes_used
         work = _work(self.floats_per_frame * frames)
         kernel, away = work[:size].reshape(shape), work[size : 2 * size].reshape(shape)
-        kernel[...] = self._log_signal
+        before = self._log_signal
         for rows, nodes in self._parts:
             inputs_each, count = len(nodes), nodes.shape[1]
             part = away[: inputs_each * count].reshape(inputs_each, count, frames, -1)
             np.subtract(nodes, inputs[rows].reshape(inputs_each, count, frames, 1), out=part)
             np.multiply(part, part, out=part)
-            less = kernel[:count]
-            np.subtract(less, part[0] if inputs_each == 1 else np.add.reduce(part, axis=0), out=less)
+            distance = part[0] if inputs_each == 1 else np.add.reduce(part, axis=0)
+            np.subtract(before[:count], distance, out=kernel[:count])
+            before = kernel
         np.exp(kernel, out=kernel)
         return self._from_kernel(kernel, mean, work[2 * size :])
 
@@ -154,12 +152,8 @@ class FusedProcesses:
             shape = (len(root), frames, root.shape[2])
             explained = work.view(root.dtype)[: len(root) * frames * root.shape[2]].reshape(shape)
             np.matmul(to_nodes, root, out=explained)
-            if not self._mean_apart:
-                mean[rows] += explained[:, :, -1]
-                explained = explained[:, :, :-1]
             np.einsum("rfk,rfk->rf", explained, explained, out=variance[rows], dtype=float)
-        if self._mean_apart:
-            mean += np.matmul(kernel, self._weights)[:, :, 0]
+        mean += np.matmul(kernel, self._weights)[:, :, 0]
         np.subtract(self._signal, variance, out=variance)
         np.maximum(variance, 0.0, out=variance)
         return mean, variance
@@ -200,6 +194,14 @@ def _reduced_root(process: ProcessRegressor) -> np.ndarray:
     covariance = process.covariance(process.theta, process.nodes, process.nodes)
     values, axes = np.linalg.eigh(root.T @ covariance @ root)
     return root @ axes[:, values * np.exp(process.theta[0]) > DROPPED_VARIANCE]
+
+
+def _is_known_in_few_digits(process: ProcessRegressor, root: np.ndarray) -> bool:
+    """Whether the variance is right to ``ROUNDED_SHARE`` in single precision. A column explains its product
+    with covariances of at most the signal variance; their rounding errors add up as those of random signs."""
+    longest = np.linalg.norm(root, axis=0).max(initial=0.0)
+    error = 2.0 * np.finfo(np.float32).eps * np.exp(1.5 * process.theta[0]) * longest
+    return bool(error <= ROUNDED_SHARE * process.noise_variance)
 
 
 def _variance_nodes(process: ProcessRegressor) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import timeit
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -15,34 +16,32 @@ from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.servable import WearerFit, check_servable
 from glovecal_service.incoming.frame_gate import Refusal, Refused
 
-# How many frames one turn may hold so that it ends within a time budget.
-
-
 _GROWTH = 1.5
+BESIDES_PREDICTION_S = 50e-6
+"""What a frame costs beside its prediction: decoding, checking, encoding, publishing."""
+CAUTION = 4.0
 
 
 class Pace:
-    """Learns what a frame costs, from the cautious side.
+    """How many frames one turn may hold so that it ends within a time budget.
 
-    It believes a faster turn at once and a slower one little by little: a single slow turn, as when the
-    process was set aside, must not make it skip frames.
+    A turn costs something, and each of its frames something. How many times as much as was measured, the
+    turns teach, from the cautious side: a faster one is believed at once and a slower one little by little,
+    for a single slow turn, as when the process was set aside, must not make it skip frames.
     """
 
-    def __init__(self, seconds_per_frame: float = 5e-3) -> None:
-        self.seconds_per_frame = seconds_per_frame
+    def __init__(self, frame_s: float = 1e-3, turn_s: float = 0.0) -> None:
+        self._frame_s, self._turn_s, self._times = frame_s, turn_s, CAUTION
 
     def observe(self, frames: int, seconds: float) -> None:
         """A turn of ``frames`` took ``seconds``."""
         if frames > 0:
-            self.seconds_per_frame = max(1e-6, min(seconds / frames, self.seconds_per_frame * _GROWTH))
+            times = seconds / (self._turn_s + frames * self._frame_s)
+            self._times = max(1e-3, min(times, self._times * _GROWTH))
 
     def frames_within(self, seconds: float) -> int:
         """At least one frame: something must go on."""
-        return max(1, int(seconds / self.seconds_per_frame))
-
-
-BESIDES_PREDICTION_S = 200e-6
-"""First guess of what a frame costs beside its prediction: decoding, checking, encoding, publishing."""
+        return max(1, int((seconds / self._times - self._turn_s) / self._frame_s))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +77,13 @@ class ServedModel:
         check_servable(model)
         predictor = GlovePredictor(model)
         low, high = model.layout.counts or (0.0, 1.0)
-        readings = np.full((1, len(model.layout.sensors)), 0.5 * (low + high))
-        frame = partial(_predict_one, predictor, predictor.stream(), readings)
-        seconds = min(timeit.repeat(frame, number=1, repeat=3))
+        readings = np.full((1 + _MORE, len(model.layout.sensors)), 0.5 * (low + high))
+        gloves = [predictor.stream() for _ in readings]
+        one, more = (
+            min(timeit.repeat(partial(_predict, predictor, gloves[:n], readings[:n]), number=1, repeat=3))
+            for n in (1, 1 + _MORE)
+        )
+        frame_s = max(more - one, 0.0) / _MORE
         return cls(
             model_id=model_id,
             name_in_pose=model_bytes(model_id),
@@ -94,8 +97,8 @@ class ServedModel:
             predictor=predictor,
             model=model,
             wearer_fit=WearerFit(model, predictor),
-            effects=predictor.stream().names,
-            pace=Pace(2 * seconds + BESIDES_PREDICTION_S),
+            effects=gloves[0].names,
+            pace=Pace(frame_s + BESIDES_PREDICTION_S, max(one - frame_s, 0.0)),
         )
 
     def check_count(self, readings: np.ndarray) -> None:
@@ -125,9 +128,14 @@ class ServedModel:
         }
 
 
-def _predict_one(predictor: GlovePredictor, effects: EffectCorrection, readings: np.ndarray) -> None:
-    base = predictor.predict(readings).mean
-    EffectCorrection.of_frames([effects], np.zeros(1), base, readings, [{}], [""])
+_MORE = 15
+"""Frames in one turn beside the first, to measure what a frame costs and what a turn does."""
+
+
+def _predict(predictor: GlovePredictor, gloves: Sequence[EffectCorrection], readings: np.ndarray) -> None:
+    """One turn: a frame of each of G gloves, ``readings`` (G, S)."""
+    base, count = predictor.predict(readings).mean, len(gloves)
+    EffectCorrection.of_frames(gloves, np.zeros(count), base, readings, [{}] * count, [""] * count)
 
 
 class ServedModels:
