@@ -30,6 +30,7 @@ USUAL = tuple(
     name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists")
 )
 """The first three want a quiet computer, the studio a browser too; the last two have no peer."""
+OF_STREAMING = ("gloves", "people", "processes", "seconds")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -41,6 +42,8 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="fewer frames, shorter runs")
     parser.add_argument("--smoke", action="store_true", help="tiny runs, in a temporary folder unless named")
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
+    parser.add_argument("--people", help="of streaming with --gloves: who have a model each; default 8")
+    parser.add_argument("--processes", help="of streaming with --gloves: that predict; default 1")
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
     parser.add_argument("--minutes", help="of studio: how long the growth of a page is watched")
     parser.add_argument("--bridge", action="append", help="of bridges: only this one; repeatable")
@@ -62,7 +65,7 @@ def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
     if part == "gaussian-process":
         command += ["--picture", str(folder / f"{part}.png")]
     if part == "streaming":
-        command += [f"--{name}={value}" for name in ("gloves", "seconds") if (value := vars(options)[name])]
+        command += [f"--{name}={value}" for name in OF_STREAMING if (value := vars(options)[name])]
     if part == "studio" and options.minutes:
         command += [f"--minutes={options.minutes}"]
     if part == "bridges":

@@ -87,7 +87,8 @@ class PoseLoop:
         self._worn = worn
         self.gloves = GlovePipelines(owners)
         arrivals.left_out = self.gloves.left_out
-        self._pending: dict[GlovePipeline, None] = {}
+        self._pending: dict[ServedModel | None, dict[GlovePipeline, None]] = {}
+        """Gloves with frames that wait, by their models; the model whose turn is next comes first."""
         self._looked_for_stale_ns = 0
         self._collected_ns = clock_ns()
         self._failed: set[str] = set()
@@ -117,20 +118,31 @@ class PoseLoop:
         for arrival in arrivals:
             lane = self.gloves.of(arrival.key, arrival.payload, arrival.received_ns)
             if lane is not None and lane.add(arrival.payload, arrival.received_ns):
-                self._pending[lane] = None
+                self._let_wait(lane)
+
+    def _let_wait(self, lane: GlovePipeline) -> None:
+        self._pending.setdefault(self._models.of(lane.glove), {})[lane] = None
 
     def _take_turn(self) -> None:
         started = time.perf_counter()
-        model = self._models.of(next(iter(self._pending)).glove)
-        lanes = [lane for lane in self._pending if self._models.of(lane.glove) is model]
+        waiting = sum(map(len, self._pending.values()))
+        model = next(iter(self._pending))
+        lanes: list[GlovePipeline] = []
+        most = waiting if model is None else model.pace.frames_within(self._round_budget_s)
+        for lane in self._pending.pop(model):
+            if len(lanes) < most and self._models.of(lane.glove) is model:
+                lanes.append(lane)
+            else:
+                self._let_wait(lane)
         if model is None:
             for lane in lanes:
                 if not self._waits_for_a_model(lane):
                     self._serve_uncalibrated(lane)
             return
-        lanes = lanes[: model.pace.frames_within(self._round_budget_s)]
+        if not lanes:
+            return
         # several frames of each glove only while all models have had a turn within the budget
-        share = len(lanes) / len(self._pending)
+        share = len(lanes) / waiting
         limit = max(1, model.pace.frames_within(self._round_budget_s * share) // len(lanes))
         served = self._serve(model, lanes, limit)
         model.pace.observe(served, time.perf_counter() - started)
@@ -232,7 +244,6 @@ class PoseLoop:
             watch.add(frame.monotonic_ns, frame.readings, None)
 
     def _open(self, lane: GlovePipeline, limit: int) -> list[tuple[Frame, int]]:
-        self._pending.pop(lane)
         opened = []
         for waiting in lane.newest(limit, clock_ns() - self._oldest_ns):
             frame = lane.open(waiting)
