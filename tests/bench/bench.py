@@ -30,7 +30,7 @@ USUAL = tuple(
     name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists")
 )
 """The first three want a quiet computer, the studio a browser too; the last two have no peer."""
-OF_STREAMING = ("gloves", "people", "processes", "seconds")
+OF_STREAMING = ("gloves", "people", "processes", "recordings", "seconds")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
@@ -44,6 +44,7 @@ def main() -> int:
     parser.add_argument("--gloves", help="of streaming: only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--people", help="of streaming with --gloves: who have a model each; default 8")
     parser.add_argument("--processes", help="of streaming with --gloves: that predict; default 1")
+    parser.add_argument("--recordings", help="of streaming with --gloves: begun a second meanwhile")
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
     parser.add_argument("--minutes", help="of studio: how long the growth of a page is watched")
     parser.add_argument("--bridge", action="append", help="of bridges: only this one; repeatable")

@@ -1,7 +1,7 @@
 """Frames in, poses out, through the running service and real zenoh: latency, age, and where every frame went.
 
     python tests/bench/streaming_bench.py [--gloves 16,32,64] [--people N] [--processes N]
-                                          [--seconds S] [--quick] [--smoke] [--json FILE]
+                                          [--recordings N] [--seconds S] [--quick] [--smoke] [--json FILE]
 
 Two processes: the real-time process of the product (with ``--processes`` several), and one that stands for
 all gloves and all readers of poses (``streaming_load.py``). Latency is from just before a frame's ``put`` to
@@ -15,6 +15,7 @@ minute: ``--gloves 64 --seconds 600``.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import multiprocessing
 import operator
@@ -67,6 +68,8 @@ class Case:
     processes: int = 1
     people: int = PEOPLE
     """Who have a model each; gloves of one share it."""
+    recordings: int = 0
+    """Begun a second, meanwhile, and each ended a second later."""
     targets: tuple[tuple[str, str, float], ...] = ()
     """(figure, "<=", ">=" or "==", value)."""
 
@@ -76,6 +79,9 @@ def main() -> None:
     parser.add_argument("--gloves", type=_numbers, help="only so many gloves with effects, such as 16,32,64")
     parser.add_argument("--processes", type=int, default=1, help="that predict, with --gloves; default 1")
     parser.add_argument("--people", type=int, default=PEOPLE, help="who have a model each, with --gloves")
+    parser.add_argument(
+        "--recordings", type=int, default=0, help="begun a second meanwhile, with --gloves; default 0"
+    )
     parser.add_argument("--seconds", type=float, help="length of a run with --gloves; default 20")
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument(
@@ -89,12 +95,9 @@ def main() -> None:
     results: list[dict[str, Any]] = []
     smoke = map(run, [Case("2 gloves, smoke test", 2, 120.0, 1.0, nodes=10, effects=True)])
     if arguments.gloves:
-        chosen = (
-            arguments.seconds or (5.0 if arguments.quick else 20.0),
-            arguments.processes,
-            arguments.people,
-        )
-        cases = (run(_gloves_case(count, *chosen)) for count in arguments.gloves)
+        seconds = arguments.seconds or (5.0 if arguments.quick else 20.0)
+        chosen = {name: getattr(arguments, name) for name in ("processes", "people", "recordings")}
+        cases = (run(_gloves_case(count, seconds, **chosen)) for count in arguments.gloves)
     else:
         cases = run_all(quick=arguments.quick)
     for result in smoke if arguments.smoke else cases:
@@ -130,15 +133,19 @@ def run_all(*, quick: bool) -> Iterator[dict[str, Any]]:
     yield run(overload)
 
 
-def _gloves_case(count: int, seconds: float, processes: int = 1, people: int = PEOPLE) -> Case:
+def _gloves_case(
+    count: int, seconds: float, processes: int = 1, people: int = PEOPLE, recordings: int = 0
+) -> Case:
     targets = [("age_p99_ms", "<=", 20.0), ("predicted_share", ">=", 0.995), ("unaccounted", "==", 0)]
     if seconds > FIRST_MINUTE_S:
         targets.append(("memory_growth_mib", "<=", 5.0))
     name = f"{count} gloves at 120 Hz, {people} models with {' and '.join(EFFECTS)}"
     name += f", {processes} processes" if processes > 1 else ""
+    name += f", {recordings} recordings begun a second" if recordings else ""
     return Case(
-        name, count, 120.0, seconds, effects=True, processes=processes, people=people, targets=tuple(targets)
-    )
+        name, count, 120.0, seconds, effects=True, processes=processes, people=people, recordings=recordings,
+        targets=tuple(targets),
+    )  # fmt: skip
 
 
 def run(case: Case) -> dict[str, Any]:
@@ -151,6 +158,9 @@ def run(case: Case) -> dict[str, Any]:
         load = Load(settings.zenoh, settings.site, case.gloves, case.people, case.rate_hz, case.seconds)
         driver, driving = running.enter_context(helper(drive, load))
         driver.recv()
+        if case.recordings:
+            asking, _ = running.enter_context(helper(ask_for_recordings, settings, case))
+            asking.recv()
         costs = [ProcessCost(process) for process in (first, *more)]
         with ProcessCost(driving) as load_cost, ExitStack() as counting:
             for cost in costs:
@@ -266,6 +276,22 @@ def store_models(settings: Settings, case: Case) -> None:
                 dump(model), subject=subject, layout=model.layout.name, method="spgp", parent=None, facts={}
             )
             store.models.activate(record.id)
+
+
+def ask_for_recordings(pipe: Any, settings: Settings, case: Case) -> None:
+    """Send "ready", then ask for recordings until the other end of the pipe is closed."""
+    with Store.open(settings) as store:
+        for number in range(case.gloves):
+            store.gloves.assign(f"glove{number}", f"person{number % case.people}", wearing="first")
+        pipe.send("ready")
+        open_ones: list[str] = []
+        for number in itertools.count():
+            if pipe.poll(1.0 / case.recordings):
+                return
+            asked = store.recordings.request(f"glove{number % case.gloves}", name=f"take {number}")
+            open_ones.append(asked.id)
+            if len(open_ones) > case.recordings:
+                store.recordings.update(open_ones.pop(0), state="failed")
 
 
 def random_model(subject: str, nodes: int, *, seed: int) -> CalibrationModel:
