@@ -85,6 +85,7 @@ NAVIGATION = {
     ],
     "Project": [
         "As measured <docs/measured>",
+        "Capacity <docs/capacity>",
         "Faults <docs/faults>",
         *STUDY,
         *TRIED,

@@ -25,11 +25,14 @@ PARTS = {
     "bridges": "bridges_bench.py",
     "retargeting": "retargeting_table.py",
     "lists": "lists_bench.py",
+    "capacity": "capacity_bench.py",
 }
 USUAL = tuple(
-    name for name in PARTS if name not in ("certificates", "studio", "bridges", "retargeting", "lists")
+    name
+    for name in PARTS
+    if name not in ("certificates", "studio", "bridges", "retargeting", "lists", "capacity")
 )
-"""The first three want a quiet computer, the studio a browser too; the last two have no peer."""
+"""The first three want a quiet computer, the studio a browser too; the last three have no peer."""
 OF_STREAMING = ("gloves", "people", "processes", "recordings", "seconds")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
@@ -48,6 +51,7 @@ def main() -> int:
     parser.add_argument("--seconds", help="of streaming with --gloves: length of a run")
     parser.add_argument("--minutes", help="of studio: how long the growth of a page is watched")
     parser.add_argument("--bridge", action="append", help="of bridges: only this one; repeatable")
+    parser.add_argument("--page", help="of capacity: put the figures between their marks in this page")
     parser.add_argument("--folder", type=Path, help="for figures and picture; default .bench")
     options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
@@ -69,6 +73,8 @@ def _run(part: str, folder: Path, options: argparse.Namespace) -> int:
         command += [f"--{name}={value}" for name in OF_STREAMING if (value := vars(options)[name])]
     if part == "studio" and options.minutes:
         command += [f"--minutes={options.minutes}"]
+    if part == "capacity" and options.page:
+        command += [f"--page={options.page}"]
     if part == "bridges":
         command += [f"--bridge={name}" for name in options.bridge or ()]
     return subprocess.run(command, env={**os.environ, **ONE_THREAD}).returncode

@@ -159,9 +159,8 @@ class GloveOwners:
                 token.undeclare()
 
     def _is_next(self, glove: str, among: str = "") -> bool:
-        mine = _weight(self._instance, glove)
         rivals = (other for other in self._others if other.startswith(among))
-        return all(_weight(other, glove) < mine for other in rivals)
+        return owner_of(glove, [self._instance, *rivals]) == self._instance
 
     def _note_highest(self, glove: str, term: int) -> None:
         if glove not in self._highest and len(self._highest) >= MOST_GLOVES:
@@ -221,5 +220,7 @@ def _kind(instance: str) -> str:
     return instance.partition("-")[0]
 
 
-def _weight(instance: str, glove: str) -> bytes:
-    return hashlib.blake2b(f"{instance}/{glove}".encode(), digest_size=8).digest()
+def owner_of(glove: str, instances: Iterable[str]) -> str:
+    """Which process of those that are there has a glove (rendezvous hashing): all work out the same one, and
+    one that goes leaves the gloves of the others where they are."""
+    return max(instances, key=lambda each: hashlib.blake2b(f"{each}/{glove}".encode(), digest_size=8).digest())
