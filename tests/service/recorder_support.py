@@ -40,12 +40,12 @@ def store_with_glove(settings: Settings) -> Iterator[Store]:
 
 @contextmanager
 def capturing(
-    settings: Settings, data: Path | None = None, device: SteadyDevice | None = None
+    settings: Settings, data: Path | None = None, device: SteadyDevice | None = None, glove: str = GLOVE
 ) -> Iterator[None]:
     """The capture daemon with a glove at 200 Hz; its log below ``data``, the settings' folder by default."""
     stop = threading.Event()
     folder = (data or settings.data) / "captured"
-    capture = CaptureSettings(GloveKeys(settings.site, GLOVE), "anna", "morning", (settings.zenoh,), folder)
+    capture = CaptureSettings(GloveKeys(settings.site, glove), "anna", "morning", (settings.zenoh,), folder)
     daemon = CaptureDaemon(device or SteadyDevice(200.0), capture, lambda sentence: None)
     thread = threading.Thread(target=daemon.run, args=(stop,))
     thread.start()

@@ -12,7 +12,7 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
-from realtime_support import eventually, free_endpoint, part_of_service
+from realtime_support import LAYOUT, SteadyDevice, eventually, free_endpoint, part_of_service
 from recorder_support import GLOVE, capturing, goes_on, quick_recorder, store_with_glove
 
 from glovecal_client import Recording
@@ -148,6 +148,31 @@ def test_a_recorder_that_stood_still_lets_go_what_another_took_over(tmp_path: Pa
         check_take(store, record.id)
         ledger = first.settings.recordings_folder / f"{record.id}.glog"
         assert list(Recording.open(ledger).payloads()), "what it had written stays"
+
+
+@pytest.mark.slow
+def test_thirty_two_gloves_and_twenty_kills_cost_no_frame(tmp_path: Path) -> None:
+    """Recorders are killed in turn while all gloves are recorded, and started again."""
+    more = [f"more{number}" for number in range(31)]
+    with two_services(tmp_path) as (store, services), ExitStack() as running:
+        for glove in more:
+            store.gloves.seen(glove, {"layout": LAYOUT.name, "subject": "anna", "wearing": "morning"})
+            device = SteadyDevice(50.0)
+            running.enter_context(capturing(services[0].settings, device=device, glove=glove))
+        goes_on(services[0].settings, 200)
+        ids = [store.recordings.request(glove, name=glove, lead_s=0.0).id for glove in (GLOVE, *more)]
+        kept_by = [keeper_of(store, id, services) for id in ids]
+        assert {services.index(each) for each in kept_by} == {0, 1}, "both record some"
+        for kill in range(20):
+            services[kill % 2].end()
+            goes_on(services[0].settings, 200)
+            services[kill % 2].start()
+            goes_on(services[0].settings, 200)
+        for id in ids:
+            store.recordings.stop(id)
+        for id in ids:
+            check_take(store, id)
+        assert len(store.takes.list()) == len(ids)
 
 
 def test_only_the_keeper_reports_and_a_recording_has_one_take(tmp_path: Path) -> None:
