@@ -15,6 +15,7 @@ from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.samples import trained_ranges
 from glovecal_models.calibration.servable import Misfit, WearerFit
+from glovecal_models.takes.channel_faults import channel_faults
 from glovecal_models.takes.reading_faults import dropouts, spikes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take, dead_sensors
@@ -161,7 +162,7 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
                 "Run it again while you bend, spread and turn the whole hand.",
             ),
         )
-    return [
+    dead = [
         GloveFinding(
             "sensor",
             f"{dead.sensor} is {dead.why} while other sensors move.",
@@ -169,6 +170,7 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
         )
         for dead in dead_sensors([take], take.sensors)
     ]
+    return dead + [GloveFinding("sensor", f"{each}.", each.remedy) for each in channel_faults(take)]
 
 
 def _jumps(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:

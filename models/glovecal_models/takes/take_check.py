@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.presentation.document import answer
+from glovecal_models.takes.channel_faults import channel_faults
 from glovecal_models.takes.raw_table import time_unit_warning
 from glovecal_models.takes.reference_jumps import (
     frames_with_reference,
@@ -209,6 +210,7 @@ def _frame_warnings(
     if dead:
         named = ", ".join(map(str, dead))
         warnings.append(f"{who}: sensors that say nothing of the hand: {named}. Is a wire broken?")
+    warnings += [f"{who}: {each}. {each.remedy}" for each in channel_faults(take)]
     if repeated >= MOSTLY_REPEATED:
         warnings.append(
             f"{who}: {100 * repeated:.0f} % of the frames repeat the one before; did the hand hold still, "

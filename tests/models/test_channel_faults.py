@@ -1,0 +1,105 @@
+"""Flat lines, clipping, channels that read the same: planted into real readings, told of no sound glove."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan
+from glovecal_models.takes.channel_faults import channel_faults
+from glovecal_models.takes.table import read_takes
+from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import check_take
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+Plant = Callable[[np.ndarray, int, int], None]
+
+
+def stand_still(readings: np.ndarray, sensor: int, other: int) -> None:
+    """For a third of the take, where the others move most."""
+    width = len(readings) // 3
+    moved = np.abs(np.diff(np.delete(readings, sensor, axis=1), axis=0)).sum(axis=1)
+    first = int(np.argmax(np.convolve(moved, np.ones(width), "valid")))
+    readings[first : first + width, sensor] = readings[first, sensor]
+
+
+def cut_off(readings: np.ndarray, sensor: int, other: int) -> None:
+    values = readings[:, sensor]
+    readings[:, sensor] = np.minimum(values, np.quantile(values, 0.8))
+
+
+def wire_together(readings: np.ndarray, sensor: int, other: int) -> None:
+    readings[:, sensor] = readings[:, other]
+
+
+PLANTS: dict[str, tuple[Plant, str]] = {
+    "stuck": (stand_still, "while others move"),
+    "clipped": (cut_off, "is cut off at"),
+    "same": (wire_together, "read the same"),
+}
+
+
+def real_takes() -> Iterator[list[Take]]:
+    """Motions of one person with the sleeve placed once: 20 s or more, four stretch sensors, 26 Hz."""
+    for person in range(300, 305):
+        for placement in range(1, 4):
+            files = sorted((DATA / "ankle").glob(f"P{person}-placement{placement}-*.frames.csv"))
+            takes = [take for file in files for take in read_takes(file)]
+            if len(takes) == 4:
+                yield takes
+
+
+def told(takes: Sequence[Take]) -> list[str]:
+    return [sentence for take in takes for sentence in check_take(take).sentences if "gap" not in sentence]
+
+
+@pytest.mark.needs_shared_data
+@pytest.mark.parametrize("kind", PLANTS)
+def test_a_fault_planted_into_real_readings_is_told_and_no_other(kind: str) -> None:
+    """In one take of four, of a sensor drawn at random; clipping is in all."""
+    random, (plant, words), found, tried = np.random.default_rng(1), PLANTS[kind], 0, 0
+    for takes in real_takes():
+        sensor, other = (int(each) for each in random.permutation(4)[:2])
+        wrong = int(random.integers(4))
+        planted = []
+        for number, take in enumerate(takes):
+            readings = take.readings.copy()
+            if number == wrong or kind == "clipped":
+                plant(readings, sensor, other)
+            planted.append(replace(take, readings=readings))
+        sentences, name = told(planted), takes[0].sensors[sensor]
+        tried += 1
+        found += any(name in sentence and words in sentence for sentence in sentences)
+        assert all(name in sentence for sentence in sentences), sentences
+    assert tried >= 10
+    assert found >= 0.95 * tried
+
+
+@pytest.mark.needs_shared_data
+def test_nothing_is_told_of_channels_of_real_recordings() -> None:
+    files = sorted(file for file in DATA.glob("*/*.csv") if "reference" not in file.name)
+    takes = [take for file in files if "holds" not in str(file) for take in read_takes(file)]
+    assert len(takes) > 80
+    assert [str(fault) for take in takes for fault in channel_faults(take)] == []
+
+
+def sound_gloves() -> Iterator[SessionPlan]:
+    random = np.random.default_rng(5)
+    while True:
+        yield SessionPlan(
+            seed=int(random.integers(10**6)), wearings=1, takes_per_wearing=1, take_s=20.0,
+            rate_hz=float(random.choice([15, 30, 60, 90, 120])), motions=(random.choice(TAKE_MOTIONS),),
+            bits=int(random.choice([7, 8, 10, 12])),
+            sensor_noise_deg=float(random.choice([0, 0.05, 0.1, 0.3])),
+        )  # fmt: skip
+
+
+def test_nothing_is_told_of_sound_gloves_whatever_they_do() -> None:
+    takes = [record_session(plan, ()).takes[0] for plan in islice(sound_gloves(), 60)]
+    assert [str(fault) for take in takes for fault in channel_faults(take)] == []
