@@ -99,7 +99,7 @@ def _flat_lines(time_s: np.ndarray, values: np.ndarray, others: np.ndarray, name
 
 
 def _is_restless(values: np.ndarray) -> bool:
-    """Whether it goes to and fro even where it moves least. Flat parts are left out: they are judged by it."""
+    """Whether it goes to and fro even where it moves least; flat parts, which are judged by it, left out."""
     if len(values) < 4 * SLOW_FRAMES:
         return False
     parts = np.lib.stride_tricks.sliding_window_view(values, SLOW_FRAMES)
