@@ -223,4 +223,8 @@ def _kind(instance: str) -> str:
 def owner_of(glove: str, instances: Iterable[str]) -> str:
     """Which process of those that are there has a glove (rendezvous hashing): all work out the same one, and
     one that goes leaves the gloves of the others where they are."""
-    return max(instances, key=lambda each: hashlib.blake2b(f"{each}/{glove}".encode(), digest_size=8).digest())
+
+    def weight(instance: str) -> bytes:
+        return hashlib.blake2b(f"{instance}/{glove}".encode(), digest_size=8).digest()
+
+    return max(instances, key=weight)
