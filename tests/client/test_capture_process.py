@@ -67,6 +67,25 @@ def sequences(path: Path) -> list[int]:
     return [frame.sequence for frame in Recording.open(path).frames()]
 
 
+def test_its_image_is_healthy_while_it_is_at_work(recording: Path, tmp_path: Path) -> None:
+    """Its service is away: it is at work all the same."""
+    data = tmp_path / "data"
+
+    def health() -> tuple[int, str]:
+        command = [sys.executable, "-P", "-m", "glovecal_client.capture.health_check", str(data)]
+        asked = subprocess.run(command, capture_output=True, text=True, check=False)
+        return asked.returncode, asked.stdout
+
+    assert health() == (1, f"No capture has its log in {data}.\n")
+    with capture_process(recording, free_endpoint(), data) as process:
+        eventually(lambda: health()[0] == 0, "healthy")
+        assert health()[1].startswith("The capture of glove g1 was seen ")
+        process.send_signal(signal.SIGSTOP)
+        eventually(lambda: health()[0] == 1, "it stands still")
+        process.send_signal(signal.SIGCONT)
+        eventually(lambda: health()[0] == 0, "it goes on")
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_stopped_by_a_signal_it_states_what_it_recorded(
     recording: Path, tmp_path: Path, number: signal.Signals

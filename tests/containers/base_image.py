@@ -13,12 +13,12 @@ NOT_NEEDED = ("/var/cache/apt", "/var/lib/apt/lists", "/usr/share/doc", "/usr/sh
 
 
 def make_base(engine: Engine, base: str, folder: Path) -> None:
-    """An image called ``base``, a name that ends with a Debian, such as ``python:3.11-slim-bookworm``.
+    """An image called ``base``, a name that ends with a Debian, such as ``localhost/python:bookworm``.
 
     Its Python is Debian's. It trusts whom this computer trusts: its packages come the same way. Raises
     Unavailable without root or debootstrap.
     """
-    system = BareSystem(folder, base.rpartition("-")[2])
+    system = BareSystem(folder, base.rpartition(":")[2])
     system.make(debian_mirror(Path("/etc/apt")), engine.architecture)
     system.take_network_settings()
     system.inside("/usr/bin/python").symlink_to("python3")
@@ -33,6 +33,6 @@ def make_base(engine: Engine, base: str, folder: Path) -> None:
     subprocess.run(["tar", "-C", str(system.root), "-cf", str(archive), "."], check=True)
     trust = [f"--change=ENV {name}={CERTIFICATES}" for name in ("SSL_CERT_FILE", "PIP_CERT")]
     processor = [f"--arch={engine.architecture}"] if engine.architecture else []
-    engine("import", *processor, *trust, str(archive), f"localhost/{base}")
+    engine("import", *processor, *trust, str(archive), base)
     archive.unlink()
     shutil.rmtree(system.root)

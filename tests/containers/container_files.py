@@ -11,7 +11,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 DOCKERFILES = ("service.Dockerfile", "capture.Dockerfile")
-BASE = "python:3.11-slim-bookworm"
+PINNED = re.compile(r"[a-z0-9./-]+:[a-z0-9.-]+@sha256:[0-9a-f]{64}")
+
+
+def base(root: Path) -> str:
+    """What the images of a checkout start from: name, tag and, but for earlier ones, digest."""
+    return _base((root / "docker" / DOCKERFILES[0]).read_text(encoding="utf-8"))
 
 
 def problems(root: Path) -> list[str]:
@@ -19,8 +24,10 @@ def problems(root: Path) -> list[str]:
     found = list(_schema_problems(root / "docker" / "compose.yaml"))
     for name in DOCKERFILES:
         text = (root / "docker" / name).read_text(encoding="utf-8")
+        if _base(text) != base(root):
+            found.append(f"{name} starts from another image than {DOCKERFILES[0]}")
         found += [f"{name}: {problem}" for problem in _file_problems(root, text)]
-        found += [f"{name}: {problem}" for problem in _sync_problems(root, text)]
+        found += [f"{name}: {problem}" for problem in _lock_problems(root, text)]
     return found
 
 
@@ -37,10 +44,19 @@ def _schema_problems(compose: Path) -> Iterator[str]:
         yield f"{compose.name} is no Compose file: {checked.stdout}{checked.stderr}".strip()
 
 
+def _base(text: str) -> str:
+    """ "" where there is none."""
+    found = re.search(r"^ARG BASE=(\S+)$", text, re.MULTILINE)
+    return found[1] if found else ""
+
+
 def _file_problems(root: Path, text: str) -> Iterator[str]:
     """Bases, copied files and the health check's module."""
-    if f"ARG BASE={BASE}\n" not in text or set(re.findall(r"^FROM (\S+)", text, re.MULTILINE)) != {"$BASE"}:
-        yield f"both stages are to start from {BASE}, by BASE"
+    if not PINNED.fullmatch(_base(text)):
+        yield f"BASE is not pinned by its digest: {_base(text)!r}"
+    stages = set(re.findall(r"^FROM \S+ AS (\S+)", text, re.MULTILINE))
+    if others := set(re.findall(r"^FROM (\S+)", text, re.MULTILINE)) - {"$BASE", *stages}:
+        yield f"every stage is to start from BASE, by one ARG; these do not: {', '.join(sorted(others))}"
     for line in re.findall(r"^COPY (?!--from)(.+)$", text, re.MULTILINE):
         for source in line.split()[:-1]:
             if not (root / source).exists():
@@ -50,16 +66,17 @@ def _file_problems(root: Path, text: str) -> Iterator[str]:
         yield f"HEALTHCHECK runs {shlex.join(asked)}, which is no module of ours"
 
 
-def _sync_problems(root: Path, text: str) -> Iterator[str]:
-    """Whether the lock has what the first uv sync asks for (its wheels: tests/verbs/test_lock.py)."""
-    uv = [str(root / ".tools" / "bin" / "uv"), *_first_sync(text), "--dry-run", "--offline", "--quiet"]
-    asked = subprocess.run([*uv, "--python", sys.executable], cwd=root, capture_output=True, text=True)
+def _lock_problems(root: Path, text: str) -> Iterator[str]:
+    """Whether the lock has what the image asks for (its wheels: tests/verbs/test_lock.py)."""
+    uv = [str(root / ".tools" / "bin" / "uv"), *_export(text), "--offline", "--python", sys.executable]
+    asked = subprocess.run(uv, cwd=root, capture_output=True, text=True)
     if asked.returncode:
         yield f"cannot be built: {asked.stderr.strip()}"
 
 
-def _first_sync(text: str) -> list[str]:
+def _export(text: str) -> list[str]:
+    """The command that lists other people's packages, without the file that it writes."""
     [extras] = re.findall(r'^ARG EXTRAS="(.*)"', text, re.MULTILINE) or [""]
-    command = text.partition("RUN uv ")[2].partition(" && ")[0].partition("\nCOPY")[0]
+    command = text.partition("RUN uv ")[2].partition("--output-file")[0]
     filled = re.sub(r"\$\(printf .*?\)", " ".join(f"--extra {name}" for name in extras.split()), command)
     return shlex.split(filled.replace("\\\n", " "))

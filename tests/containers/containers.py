@@ -29,7 +29,7 @@ from typing import Any
 
 from bare_system import Unavailable, refuse_where_impossible
 from base_image import make_base
-from container_files import BASE, problems
+from container_files import base, problems
 from engine import Engine, Failed
 
 from glovecal_client.errors import ServiceError
@@ -40,6 +40,12 @@ from glovecal_models.takes.write_table import write_takes
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVICE, CAPTURE, PREVIOUS = "glovecal-service", "glovecal-capture", "glovecal-service-previous"
+CHANGED = "glovecal-changed"
+PARTS = ("models", "client", "service")
+OF_VERSION = re.compile(r'(\nversion = "|glovecal[a-z,\[\]-]*==)[0-9][0-9.a-z]*')
+OWN_BASE = "localhost/glovecal-base:bookworm"
+"""In place of that of the Dockerfiles, where no image registry is reached."""
+MOST_MOVED_MB = 40.0
 MIGRATIONS = "service/glovecal_service/store/migrations/versions"
 UID = "10001"
 NOT_INSIDE = ("uv", "cc", "gcc", "g++", "make", "ld")
@@ -125,12 +131,13 @@ class Trial:
 
     def run(self) -> None:
         try:
-            if self.given.debootstrap and not self.engine("images", "--quiet", BASE).strip():
+            if self.given.debootstrap and not self.engine("images", "--quiet", OWN_BASE).strip():
                 refuse_where_impossible()
-                seconds = _timed(lambda: make_base(self.engine, BASE, self.folder))
+                seconds = _timed(lambda: make_base(self.engine, OWN_BASE, self.folder))
                 self.table.row("base image from Debian's packages", f"{seconds:.0f} s")
             for image in (SERVICE, CAPTURE):
                 self.build(image, ROOT)
+                self.change_code(image)
             self.look_inside()
             self.kill_while_recording()
             if not self.given.arch:
@@ -140,12 +147,41 @@ class Trial:
             self.engine("rm", "--all", "--force", check=False)
 
     def build(self, image: str, context: Path, name: str = "") -> None:
-        dockerfile = f"docker/{image.removeprefix('glovecal-')}.Dockerfile"
-        built = self.engine.build(name or image, context, dockerfile, BASE)
+        from_base = OWN_BASE if self.given.debootstrap else base(context)
+        built = self.engine.build(name or image, context, _dockerfile(image), from_base)
         self.table.row(
             f"{name or image} built",
             f"{built.seconds:.0f} s, {built.disk_mb:.0f} MB, of which its base {built.base_mb:.0f} MB",
         )
+
+    def change_code(self, image: str) -> None:
+        """What has to be moved to a computer that has the image, for another version of our code."""
+        with tempfile.TemporaryDirectory(dir=self.folder) as folder:
+            context = Path(folder)
+            for name in (
+                "pyproject.toml",
+                "uv.lock",
+                "docker",
+                "models",
+                "client",
+                "service",
+                ".dockerignore",
+            ):
+                copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy2
+                copy(ROOT / name, context / name)
+            changed = context / "client" / "glovecal_client" / "clock.py"
+            changed.write_text(changed.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+            for name in ("pyproject.toml", *(f"{part}/pyproject.toml" for part in PARTS)):
+                text = (context / name).read_text(encoding="utf-8")
+                (context / name).write_text(OF_VERSION.sub(r"\g<1>99.0.0", text), encoding="utf-8")
+            self.build(image, context, CHANGED)
+        before, after = self.engine.layers_mb(image), self.engine.layers_mb(CHANGED)
+        moved = sum(size for layer, size in after.items() if layer not in before)
+        self.table.expect(
+            moved < MOST_MOVED_MB, f"{image}: moved for another version of our code",
+            f"{moved:.1f} of {sum(after.values()):.0f} MB, unpacked",
+        )  # fmt: skip
+        self.engine("rmi", CHANGED)
 
     def look_inside(self) -> None:
         for image in (SERVICE, CAPTURE):
@@ -184,6 +220,7 @@ class Trial:
                 time.sleep(RECORDED_S)
                 client.post(f"/recordings/{recording}/stop")
                 facts = client.finish_recording(recording, patience_s=600)["facts"]
+                self.healthy(CAPTURE)
             kept = facts["recorded"] == facts["sent"] and facts["missing_frames"] == 0
             self.table.expect(
                 kept, "frames of a recording over a kill -9",
@@ -286,7 +323,7 @@ class Trial:
         """As the engine sees it, by the image's own health check."""
         self.engine("healthcheck", "run", name, check=False)
         state = self.engine("inspect", "--format", "{{.State.Health.Status}}", name, check=False)
-        self.table.expect(state.split()[-1:] == ["healthy"], "health check of the image", state.strip())
+        self.table.expect(state.split()[-1:] == ["healthy"], f"health check of {name}", state.strip())
 
     def until(self, true: Callable[[], bool], what: str) -> None:
         _until(true, what, READY_WITHIN_S * (EMULATED_SLOWER if self.given.arch else 1))
@@ -303,6 +340,10 @@ class Trial:
             self.until(ready, "the service")
         except Failed as error:
             raise Failed(f"{error}\n{self.engine.log(SERVICE)}") from error
+
+
+def _dockerfile(image: str) -> str:
+    return f"docker/{image.removeprefix('glovecal-')}.Dockerfile"
 
 
 def _stored(client: RestClient, model: str) -> dict[str, Any]:

@@ -28,6 +28,7 @@ events_logger = "file"
 runtime = "{runtime}"
 """
 USED = {"nofile": resource.RLIMIT_NOFILE, "nproc": resource.RLIMIT_NPROC}
+CLOSED = ("--read-only", "--cap-drop=ALL", "--security-opt=no-new-privileges")
 FIT_IN = 1 << 12
 """Limits of a container; where this computer allows less, what it allows."""
 
@@ -77,13 +78,24 @@ class Engine:
 
     def build(self, image: str, context: Path, dockerfile: str, base: str) -> Built:
         started = time.monotonic()
-        options = ("--network", "host", "--format", "docker")
+        options = ("--network", "host", "--format", "docker", "--build-arg", f"BASE={base}")
         self("build", *options, *self.platform, "-f", str(context / dockerfile), "-t", image, str(context))
         return Built(time.monotonic() - started, self._size_mb(image), self._size_mb(base))
 
     def _size_mb(self, image: str) -> float:
         [found] = json.loads(self("image", "inspect", image))
         return found["Size"] / 1e6
+
+    def layers_mb(self, image: str) -> dict[str, float]:
+        """Of each layer by its digest, unpacked."""
+        [found] = json.loads(self("image", "inspect", image))
+        steps = json.loads(self("history", "--format", "json", image))[::-1]
+        made = [
+            step["size"] / 1e6
+            for step, told in zip(steps, found["History"], strict=True)
+            if not told.get("empty_layer")
+        ]
+        return dict(zip(found["RootFS"]["Layers"], made, strict=True))
 
     def log(self, name: str) -> str:
         """The last lines of a container."""
@@ -92,8 +104,8 @@ class Engine:
 
     @contextmanager
     def running(self, image: str, name: str, *command: str, options: Sequence[str] = ()) -> Iterator[str]:
-        """A container in the background, its root read-only; gone at the end of the block."""
-        self("run", "--detach", "--name", name, "--read-only", *self.platform, *options, image, *command)
+        """A container in the background, closed as the Dockerfiles say; gone at the end of the block."""
+        self("run", "--detach", "--name", name, *CLOSED, *self.platform, *options, image, *command)
         try:
             yield name
         finally:

@@ -256,6 +256,7 @@ class CaptureDaemon:
         self._index = queries.index(self._run_id)
         sources = LinkSources(self._status.text, self._meta_now, queries, self._commands.take)
         run = (self._status.started_wall_ns, self._run_id)
+        self._folder = folder
         self._link = CaptureLink(self._settings.keys, self._settings.endpoints, run, sources, self._report)
         reopening = ReopeningDevice(self._device)
         syncing = BackgroundSync(self._log)
@@ -307,6 +308,7 @@ class CaptureDaemon:
         self._note_damaged()
         self._status.own_clock = getattr(self._device, "own_clock", None)
         self._link.publish_status()
+        self._folder.beat()
         with contextlib.suppress(OSError):  # a disk that fails shows in the log's own problem
             self._index.extend()
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import bisect
 import hashlib
 import json
+import os
 import re
 import struct
 import threading
@@ -28,6 +29,7 @@ from glovecal_client.private_files import make_private
 from glovecal_client.wire.frame import frame_sequence
 
 SUFFIX = ".glvlog"
+LOCK = "lock"
 EARLIER_RUNS = 16
 
 
@@ -42,7 +44,7 @@ class LogFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             with suppress(PermissionError):  # a file system without permissions takes recordings all the same
                 make_private(data / "capture")
-            self._lock = (self.path / "lock").open("ab")
+            self._lock = (self.path / LOCK).open("ab")
         except BadEncryptionKey:
             raise
         except OSError as error:
@@ -56,6 +58,11 @@ class LogFolder:
             raise CaptureRefused(
                 f"capture of glove {keys.glove!r}: another capture on this computer is writing to {self.path}"
             ) from error
+
+    def beat(self) -> None:
+        """A sign of life of the daemon, which ``seen_s_ago`` sees: the lock's own time."""
+        with suppress(OSError):
+            os.utime(self.path / LOCK)
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -133,6 +140,15 @@ class LogFolder:
     def find(self, run_id: int) -> Path | None:
         """The log of a run, None if there is none."""
         return next(iter(self.path.glob(f"*-{run_id:016x}{SUFFIX}")), None)
+
+
+def seen_s_ago(data: Path) -> tuple[str, float] | None:
+    """Of the daemon below ``data`` that was seen last: its glove, and seconds since then; None: none was."""
+    locks = list((data / "capture").glob(f"*/*/{LOCK}"))
+    if not locks:
+        return None
+    last = max(locks, key=lambda lock: lock.stat().st_mtime)
+    return last.parent.name, max(0.0, time.time() - last.stat().st_mtime)
 
 
 def _encrypt(logs: list[Path], report: Callable[[str], None]) -> None:
