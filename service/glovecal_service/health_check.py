@@ -1,7 +1,8 @@
-"""Whether the service on this computer serves gloves: ``python -m glovecal_service.health_check``.
+"""Whether every process of the service on this computer lives: ``python -m glovecal_service.health_check``.
 
-For container images, whose engine asks every few seconds: it loads nothing but the standard library. Prints
-one sentence; exit code 0 when the service is ready, else 1.
+For container images, whose engine asks every few seconds and may restart what is not healthy: it loads
+nothing but the standard library, and asks once. Prints one sentence; exit code 0 when all live, else 1. A
+service without its database lives: ``/v1/health/ready`` tells that.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ def main() -> int:
 
 
 def ask(host: str, port: str) -> tuple[bool, str]:
-    """Whether the service there is ready, and a sentence."""
+    """Whether the service there lives, and a sentence."""
     connection = None
     try:
         connection = _connection(host, int(port))
-        connection.request("GET", "/v1/health/ready", headers={"Host": f"localhost:{port}"})
+        connection.request("GET", "/v1/health/live", headers={"Host": f"localhost:{port}"})
         answer = connection.getresponse()
         found = json.loads(answer.read())
     except (OSError, HTTPException, ValueError):
@@ -38,9 +39,8 @@ def ask(host: str, port: str) -> tuple[bool, str]:
         if connection is not None:
             connection.close()
     if answer.status != 200:
-        return False, f"Not ready: {found.get('detail', answer.status)}."
-    told = [f"Ready: {found['database']}, {found['artifacts']}.", *found["problems"]]
-    return True, " ".join(told)
+        return False, f"Not healthy: {found.get('detail', answer.status)}."
+    return True, f"Healthy: {', '.join(found['processes_seen_s_ago'])}."
 
 
 def _connection(host: str, port: int) -> HTTPConnection:

@@ -43,6 +43,7 @@ from glovecal_models.errors import BadInput, GlovecalError
 from glovecal_service.logs import Word, log_to_stderr
 from glovecal_service.operating_system import FORKS, children_context, open_many_files
 from glovecal_service.plain import reason_of
+from glovecal_service.pulses import Pulses
 from glovecal_service.rest.http.request_guard import asks_who
 from glovecal_service.restarts import Restarts
 from glovecal_service.settings import Settings
@@ -59,6 +60,8 @@ QUICK_CRASHES = 20
 """So many crashes in a row are answered with the first delay, by a process that gets as far as serving."""
 STOP_WITHIN_S = 10.0
 
+NAMED = "glovecal "
+"""What the systems' names of processes begin with."""
 READY_WITHIN_S = 60.0
 DATABASE_WITHIN_S = 60.0
 
@@ -169,6 +172,7 @@ def _serve(settings: Settings, parts: list[Part], lock: DataFolderLock) -> int:
     import glovecal_service.realtime.process  # noqa: F401  # for the processes, also those after a crash
 
     Restarts(settings.data).forget()
+    Pulses(settings.data).expect(part.name for part in parts)
     lifeline = Lifeline(*_CONTEXT.Pipe(duplex=False))
     try:
         for part in parts:
@@ -331,7 +335,7 @@ def _start(part: Part, settings: Settings, lifeline: Lifeline) -> None:
     part.process = _CONTEXT.Process(
         target=run_part,
         args=(part.work, settings, part.ready, lifeline.of_a_child()),
-        name=f"glovecal {part.name}",
+        name=f"{NAMED}{part.name}",
     )
     part.process.start()
     part.started_at = time.monotonic()
@@ -383,7 +387,8 @@ def _stop(parts: list[Part], lifeline: Lifeline) -> None:
 
 
 def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
-    """What a child does first: see to it that it stops when asked, and when the parent is gone."""
+    """What a child does first: see to it that it stops when asked, and when the parent is gone, and that
+    it is seen to live."""
     guard_streams()
     settle = log_to_stderr(settings)
     keep_private()
@@ -391,10 +396,12 @@ def run_part(work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> 
     leave_signals_to_the_parent()
     handle_signals(lambda *_: stopped.set(), signal.SIGTERM)
     Thread(target=lifeline.hold, args=(stopped,), daemon=True).start()
+    name = multiprocessing.current_process().name
+    Thread(target=Pulses(settings.data).beat, args=(name.removeprefix(NAMED), stopped), daemon=True).start()
     try:
         work(settings, stopped, ready.set)
     except Exception as error:
-        _log.error("%s: %s", Word(multiprocessing.current_process().name), error)
+        _log.error("%s: %s", Word(name), error)
         sys.exit(1)
     finally:
         settle()

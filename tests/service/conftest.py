@@ -49,6 +49,14 @@ def postgres(not_here: Callable[[str], NoReturn]) -> Iterator[PostgresServer]:
 
 
 @pytest.fixture
+def own_postgres(postgres: PostgresServer) -> Iterator[PostgresServer]:
+    """A server of one test alone: it will be killed."""
+    server = PostgresServer(postgres.programs)
+    yield server
+    server.remove()
+
+
+@pytest.fixture
 def sqlite_settings(tmp_path: Path) -> Settings:
     return Settings(data=tmp_path / "data", database=None, artifacts=None, workers=2)
 

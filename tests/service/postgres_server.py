@@ -25,7 +25,7 @@ class PostgresServer:
     """PostgreSQL refuses to run as root, so root runs it as user ``postgres``."""
 
     def __init__(self, programs: Path) -> None:
-        self._programs = programs
+        self.programs = programs
         # not TMPDIR: user postgres must be able to go there, and a socket's path has at most 107 bytes
         self.folder = Path(tempfile.mkdtemp(prefix="glovecal-pg-", dir="/tmp"))
         self._user = "postgres" if os.geteuid() == 0 else None
@@ -66,7 +66,7 @@ class PostgresServer:
         return f"postgresql+psycopg://postgres@/{name}?host={self.folder}"
 
     def _run(self, program: str, *arguments: str) -> None:
-        command = [str(self._programs / program), "-D", str(self.folder / "data"), *arguments]
+        command = [str(self.programs / program), "-D", str(self.folder / "data"), *arguments]
         other = {"user": self._user, "group": self._user, "extra_groups": []} if self._user else {}
         done = subprocess.run(command, capture_output=True, text=True, cwd="/", check=False, **other)
         if done.returncode:

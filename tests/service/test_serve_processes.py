@@ -15,6 +15,7 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from postgres_server import PostgresServer
 from realtime_support import WireGlove, eventually, free_endpoint
 
 from glovecal_client.errors import NoAnswer
@@ -135,23 +136,62 @@ def listener(process: subprocess.Popen[str], port: int) -> int:
     return 0
 
 
+def status_and_detail(port: int, route: str) -> tuple[int, str]:
+    answer = httpx.get(f"http://127.0.0.1:{port}/v1/health/{route}", timeout=5.0)
+    return answer.status_code, answer.json().get("detail", "")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no process is halted there")
-def test_it_is_healthy_only_while_gloves_are_served(
-    serving: tuple[subprocess.Popen[str], str, int], tmp_path: Path
-) -> None:
-    process, endpoint, port = serving
+def test_it_is_healthy_only_while_each_of_its_processes_lives(tmp_path: Path) -> None:
+    endpoint, port = free_endpoint(), free_port()
     assert health(port) == (1, f"Nothing answers as Glovecal on 127.0.0.1, port {port}, within 4 s.\n")
-    assert process.stdout is not None
-    assert process.stdout.readline().startswith("Glovecal is running")
-    code, said = health(port)
-    assert (code, said[:15]) == (0, "Ready: sqlite, ")
-    halted = answers(endpoint)
-    os.kill(halted, signal.SIGSTOP)
-    os.utime(tmp_path / "data" / "realtime.alive", (0, 0))
-    code, said = health(port)
-    os.kill(halted, signal.SIGCONT)
-    assert code == 1
-    assert said.startswith("Not ready: no glove is served: the real-time process was last seen ")
+    process = start(tmp_path / "data", endpoint, port, GLOVECAL_REALTIME="2", GLOVECAL_RECORDERS="2")
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("Glovecal is running")
+        assert health(port) == (0, "Healthy: real time, real time 2, recorder, recorder 2, web.\n")
+        assert status_and_detail(port, "ready") == (200, "")
+        by_start = sorted(children(process), key=lambda child: psutil.Process(child).create_time())
+        for number, name in ((0, "real time"), (1, "real time 2"), (3, "recorder 2")):
+            os.kill(by_start[number], signal.SIGSTOP)
+            eventually(lambda: health(port)[0] == 1, f"{name} is missed")
+            assert f"no sign of life ({name} for " in health(port)[1]
+            assert status_and_detail(port, "ready")[0] == 503
+            os.kill(by_start[number], signal.SIGCONT)
+            eventually(lambda: health(port)[0] == 0, f"{name} is back")
+            eventually(lambda: status_and_detail(port, "ready")[0] == 200, f"{name} works")
+    finally:
+        process.kill()
+        process.communicate(timeout=120)
+
+
+@pytest.mark.needs_postgres
+def test_without_its_database_it_lives_and_is_not_ready(tmp_path: Path, own_postgres: PostgresServer) -> None:
+    """Whoever restarts what does not live must not end the poses."""
+    endpoint, port = free_endpoint(), free_port()
+    process = start(tmp_path / "data", endpoint, port, GLOVECAL_DATABASE=own_postgres.new_database())
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("Glovecal is running")
+        eventually(lambda: status_and_detail(port, "ready") == (200, ""), "ready")
+        with open_client([endpoint]) as session, PoseSubscriber(session, "lab", "right") as poses:
+            glove = WireGlove(session, Settings(), "right")
+
+            def pose_comes() -> bool:
+                glove.send()
+                return poses.wait(0.02) is not None
+
+            eventually(pose_comes, "the first pose")
+            own_postgres.stop()
+            eventually(lambda: status_and_detail(port, "ready")[0] == 503, "not ready")
+            assert "the database does not work" in status_and_detail(port, "ready")[1]
+            assert health(port) == (0, "Healthy: real time, recorder, web.\n")
+            eventually(pose_comes, "poses go on")
+            own_postgres.start_after_kill()
+            eventually(lambda: status_and_detail(port, "ready") == (200, ""), "ready again")
+    finally:
+        process.kill()
+        process.communicate(timeout=120)
 
 
 def test_each_part_survives_the_death_of_the_others(serving: tuple[subprocess.Popen[str], str, int]) -> None:

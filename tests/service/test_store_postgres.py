@@ -10,7 +10,6 @@ import time
 import psutil
 import pytest
 from jobs_waiting import wait_for
-from postgres_server import PostgresServer, find_programs
 from realtime_support import free_endpoint
 from sqlalchemy import text
 
@@ -22,16 +21,6 @@ from glovecal_service.store.database import Database
 from glovecal_service.store.errors import StoreUnavailable
 
 pytestmark = pytest.mark.needs_postgres
-
-
-@pytest.fixture
-def own_postgres(postgres):
-    """A server of this test alone: it will be killed."""
-    programs = find_programs()
-    assert programs is not None
-    server = PostgresServer(programs)
-    yield server
-    server.remove()
 
 
 def test_nothing_acknowledged_is_lost_when_the_server_is_killed(own_postgres, sqlite_settings):

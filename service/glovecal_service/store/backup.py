@@ -42,8 +42,8 @@ FORMAT = "glovecal.backup.v1"
 DATABASE, MANIFEST = "database.sqlite3", "manifest.json"
 ARTIFACTS, FILES = "artifacts/", "files/"
 _OF_A_PROCESS = (LOCK, WHO, "realtime.alive", "realtime.restarts")
-_OF_ONE_RUN = ("artifacts", "artifacts-cache", "fits", "owners")
-"""Folders: artifacts come as the database names them, the others are of jobs that begin anew."""
+_OF_ONE_RUN = ("artifacts", "artifacts-cache", "fits", "owners", "pulses")
+"""Folders: artifacts come as the database names them, the others are of what begins anew."""
 _UNFINISHED = (".writing-", ".unfinished", ".encrypting")
 _ROWS_AT_ONCE = 500
 _LARGEST_MANIFEST = 1 << 28

@@ -119,6 +119,7 @@ FOLDERS = frozenset(
         "films",
         "fits",
         "owners",
+        "pulses",
         "recordings",
         "uploads",
         "videos",

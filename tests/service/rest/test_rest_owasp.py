@@ -169,7 +169,7 @@ def test_api9_everything_served_is_documented(http: httpx.Client) -> None:
 
 
 def test_health_and_metrics(shared: RestClient) -> None:
-    assert shared.get("/health/live") == {"status": "alive"}
+    assert shared.get("/health/live") == {"status": "alive", "processes_seen_s_ago": {}}
     with pytest.raises(Refused, match="no glove is served: the real-time process was never seen") as refused:
         shared.get("/health/ready")
     assert refused.value.status == 503
@@ -190,7 +190,7 @@ def test_ready_says_what_does_not_work(shared: RestClient, monkeypatch: pytest.M
     with pytest.raises(Refused, match="damaged") as refused:
         shared.get("/health/ready")
     assert refused.value.status == 503
-    assert shared.get("/health/live") == {"status": "alive"}
+    assert shared.get("/health/live") == {"status": "alive", "processes_seen_s_ago": {}}
 
 
 def test_nothing_outside_the_data_folder_is_opened(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def test_verbs_find_the_service_by_the_file_alone_and_it_is_healthy(served: Serv
     assert (listed.returncode, listed.stderr) == (0, "")
     check = [sys.executable, "-P", "-m", "glovecal_service.health_check"]
     asked = subprocess.run(check, env=served.environment | file, capture_output=True, text=True, check=False)
-    assert asked.stdout.startswith("Ready: sqlite")
+    assert asked.stdout == "Healthy: real time, recorder, web.\n"
 
 
 def test_a_real_time_process_that_was_killed_has_its_rules_again(

@@ -15,7 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse, HTMLResponse
 from markupsafe import Markup
 from prometheus_client import CONTENT_TYPE_LATEST
@@ -24,6 +24,7 @@ from pydantic import BaseModel, Field
 from glovecal_models.presentation.document import Column, Table
 from glovecal_models.presentation.html import table_html
 from glovecal_service.plain import reason_of
+from glovecal_service.pulses import SEEN_WITHIN_S, Pulses, standing_still
 from glovecal_service.report.html import STYLE, render
 from glovecal_service.rest.http.dependencies import Parts, PartsNeeded
 from glovecal_service.rest.http.problem import Problem, problems
@@ -36,13 +37,15 @@ router = APIRouter(tags=["health"])
 
 REALTIME_ALIVE = "realtime.alive"
 """A file in the data folder that the real-time process touches once a second."""
-SEEN_WITHIN_S = 5.0
 MOST_DAMAGES = 20
 """That are named; of more their number is."""
 
 
 class Live(BaseModel):
     status: Literal["alive"] = "alive"
+    processes_seen_s_ago: dict[str, float] = Field(
+        description="Each process of `glovecal serve`; 503 where one gave no sign of life for 5 s."
+    )
 
 
 class Storage(BaseModel):
@@ -60,9 +63,15 @@ class Ready(Storage):
     )
 
 
-@router.get("/health/live", summary="The process answers", responses=problems())
-def live() -> Live:
-    return Live()
+@router.get(
+    "/health/live", summary="Every process of the service lives: real time, recorders, web",
+    responses=problems(),
+)  # fmt: skip
+async def live(request: Request) -> Live:
+    """503 with a sentence where one does not, which a restart cures. It asks neither database nor object
+    store: without them gloves are served, and nothing is to be restarted. Nor does it wait for a thread:
+    those that wait for a database may be all there are."""
+    return Live(processes_seen_s_ago=_living(request.app.state.parts))
 
 
 @router.get(
@@ -79,6 +88,7 @@ def ready(parts: PartsNeeded, response: Response) -> Ready:
     restarts = Restarts(parts.settings.data)
     if restarts.within(AWAY_WITHIN_S) >= AWAY_TIMES:
         raise Problem(503, "not-ready", f"gloves are served with interruptions: {restarts.sentence()}")
+    _living(parts)
     told = [sentence for sentence in (restarts.sentence(),) if sentence]
     return Ready(
         **storage.model_dump(),
@@ -118,6 +128,13 @@ def realtime_seen_s_ago(parts: Parts) -> float | None:
     except OSError:
         return None
     return round(max(0.0, time.time() - seen), 1)
+
+
+def _living(parts: Parts) -> dict[str, float]:
+    seen_s_ago = Pulses(parts.settings.data).seen_s_ago()
+    if sentence := standing_still(seen_s_ago):
+        raise Problem(503, "not-alive", sentence)
+    return seen_s_ago
 
 
 def _no_realtime(seen_s_ago: float | None) -> str:
