@@ -11,6 +11,7 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
+from glovecal_client.installation import IMAGE, INSTALLED_BY
 from glovecal_client.operating_system import HAS_FILE_MODES
 
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
@@ -45,13 +46,15 @@ class OpenToOthers(PermissionError):
 def read_secret(file: Path, most: int) -> bytes:
     """At most so many bytes. Raises OSError, and of these OpenToOthers.
 
-    systemd shows a credential as readable for its group: an access list lets one user read it.
+    systemd shows a credential as readable for its group: an access list lets one user read it. An image has
+    one user, and how readable a secret is shown there is for its engine to say.
     """
     with file.open("rb") as stream:
         mode = stat.S_IMODE(os.fstat(stream.fileno()).st_mode)
         content = stream.read(most)
     is_credential = str(file.parent) == os.environ.get("CREDENTIALS_DIRECTORY")
-    if HAS_FILE_MODES and mode & (stat.S_IRWXO if is_credential else OTHERS):
+    is_alone = os.environ.get(INSTALLED_BY) == IMAGE
+    if HAS_FILE_MODES and not is_alone and mode & (stat.S_IRWXO if is_credential else OTHERS):
         raise OpenToOthers(f"others on this computer may read it (its mode is {mode:o}): chmod 600 {file}")
     return content
 

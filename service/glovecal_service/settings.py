@@ -12,10 +12,9 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from glovecal_client.hosts import is_loopback
-from glovecal_client.private_files import OpenToOthers, read_secret
 from glovecal_client.site.roles import ROLES, Role
-from glovecal_models.errors import BadInput, reason_of
 from glovecal_models.names import check_identifier
+from glovecal_service.secret_files import secret_in
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
@@ -25,7 +24,6 @@ _ENDPOINT = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):[0-9]{1,
 SQLITE_FILE = "glovecal.sqlite3"
 _HOST = re.compile(r"[A-Za-z0-9._:-]+\Z")
 LONGEST_ISSUER = 255
-_LONGEST_SECRET = 4096
 _SECRET_FILE = "GLOVECAL_OIDC_SECRET_FILE"
 
 
@@ -118,7 +116,7 @@ class Settings(BaseSettings):
     @classmethod
     def _secret_can_be_read(cls, file: Path | None) -> Path | None:
         if file is not None:
-            _read_secret(file)
+            secret_in(file, _SECRET_FILE)
         return file
 
     @field_validator("oidc_roles", mode="before")
@@ -164,7 +162,7 @@ class Settings(BaseSettings):
     @property
     def oidc_secret(self) -> str:
         """ "" where there is none. Raises BadInput."""
-        return "" if self.oidc_secret_file is None else _read_secret(self.oidc_secret_file)
+        return "" if self.oidc_secret_file is None else secret_in(self.oidc_secret_file, _SECRET_FILE)
 
     @property
     def database_url(self) -> str | URL:
@@ -212,16 +210,3 @@ def is_safe_address(address: str) -> bool:
     except ValueError:
         return False
     return bool(host) and (parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host)))
-
-
-def _read_secret(file: Path) -> str:
-    """Raises BadInput, without the secret."""
-    try:
-        secret = read_secret(file, _LONGEST_SECRET + 1).decode("ascii", "replace").strip()
-    except OpenToOthers as error:
-        raise BadInput(f"{_SECRET_FILE}: {error}") from error
-    except OSError as error:
-        raise BadInput(f"{_SECRET_FILE}: the file cannot be read ({reason_of(error)})") from error
-    if not secret.isprintable() or not secret.isascii() or not 0 < len(secret) <= _LONGEST_SECRET:
-        raise BadInput(f"{_SECRET_FILE}: the file must hold the secret that the provider gave, in one line")
-    return secret

@@ -48,6 +48,7 @@ from glovecal_service.cli.subject import subjects
 from glovecal_service.cli.take import takes
 from glovecal_service.cli.terminal.printing import EXPECTED, INTERRUPTED, err, exit_code_of, out, sentence_of
 from glovecal_service.questions.catalogue import AT_ONCE, QUESTIONS
+from glovecal_service.secret_files import settle_secrets
 
 HELP = ["-h", "--help"]
 SELDOM = (20_000, 20, 20)
@@ -159,6 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     completion.prepare()
     settle_environment()
     try:
+        settle_secrets()
         command()(arguments, prog_name=completion.PROGRAM)
     except KeyboardInterrupt:
         err.print("interrupted")

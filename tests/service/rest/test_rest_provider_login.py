@@ -520,8 +520,8 @@ ISSUER = {"ISSUER": "https://login.example", "CLIENT_ID": "x", "ROLES": "leads=a
         ("ROLES", "=admin", "'=admin' gives no role; write VALUE=ROLE"),
         ("SECRET_FILE", "none", "cannot be read"),
         ("SECRET_FILE", "open", "others on this computer may read it (its mode is 644): chmod 600 "),
-        ("SECRET_FILE", "empty", "must hold the secret that the provider gave, in one line"),
-        ("SECRET_FILE", "lines", "must hold the secret that the provider gave, in one line"),
+        ("SECRET_FILE", "empty", "must hold the secret in one line"),
+        ("SECRET_FILE", "lines", "must hold the secret in one line"),
     ],
 )
 def test_settings_that_cannot_be_meant_are_refused(
