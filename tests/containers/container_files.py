@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 DOCKERFILES = ("service.Dockerfile", "capture.Dockerfile")
+COMPOSE_FILES = ("compose.yaml", "site/service.yaml", "site/store.yaml")
 PINNED = re.compile(r"[a-z0-9./-]+:[a-z0-9.-]+@sha256:[0-9a-f]{64}")
 
 
@@ -21,7 +22,8 @@ def base(root: Path) -> str:
 
 def problems(root: Path) -> list[str]:
     """Sentences; none when all is well. ``root`` is a checkout with the environment that do.py makes."""
-    found = list(_schema_problems(root / "docker" / "compose.yaml"))
+    found = [problem for name in COMPOSE_FILES for problem in _schema_problems(root / "docker" / name)]
+    found += _image_problems(root)
     for name in DOCKERFILES:
         text = (root / "docker" / name).read_text(encoding="utf-8")
         if _base(text) != base(root):
@@ -42,6 +44,15 @@ def _schema_problems(compose: Path) -> Iterator[str]:
     checked = subprocess.run([*command, str(compose)], capture_output=True, text=True)
     if checked.returncode:
         yield f"{compose.name} is no Compose file: {checked.stdout}{checked.stderr}".strip()
+
+
+def _image_problems(root: Path) -> Iterator[str]:
+    """Other people's images are pinned, each by one digest in all files."""
+    texts = [(root / "docker" / name).read_text(encoding="utf-8") for name in COMPOSE_FILES]
+    images = set(re.findall(r"^ +image: (?!glovecal-)(\S+)$", "\n".join(texts), re.MULTILINE))
+    yield from (f"{image} is not pinned by its digest" for image in images if not PINNED.fullmatch(image))
+    if len({image.partition("@")[0] for image in images}) < len(images):
+        yield f"one image has several digests: {', '.join(sorted(images))}"
 
 
 def _base(text: str) -> str:

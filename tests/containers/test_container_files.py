@@ -12,9 +12,11 @@ from container_files import health_check, problems
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVICE, COMPOSE = "docker/service.Dockerfile", "docker/compose.yaml"
+STORE, OF_SITE = "docker/site/store.yaml", "docker/site/service.yaml"
 PARTS = ("models", "client", "service")
 CHANGES = (
     (COMPOSE, "restart:", "restarts:", "is no Compose file"),
+    (STORE, "bookworm@sha256:", "bookworm@sha512:", "one image has several digests: postgres:15"),
     (SERVICE, "COPY client client", "COPY clients client", "COPY names clients, which is not there"),
     (SERVICE, '"glovecal_service.health_check"', '"glovecal_service.healthy"', "is no module of ours"),
     (SERVICE, "FROM $BASE\n", "FROM debian\n", "these do not: debian"),
@@ -54,7 +56,8 @@ def test_what_is_wrong_in_them_is_told(checkout: Path, tmp_path: Path) -> None:
 
 
 def test_both_engines_ask_the_same(checkout: Path) -> None:
-    """A Docker image carries its health check; compose.yaml names it again for images that do not."""
+    """A Docker image carries its health check; Compose files name it again for images that do not."""
     asked = health_check((checkout / SERVICE).read_text(encoding="utf-8"))
     listed = ", ".join(f'"{word}"' for word in ["CMD", *asked])
-    assert f"test: [{listed}]" in (checkout / COMPOSE).read_text(encoding="utf-8")
+    for file in (COMPOSE, OF_SITE):
+        assert f"test: [{listed}]" in (checkout / file).read_text(encoding="utf-8")
