@@ -208,7 +208,8 @@ def _why_not(settings: Settings, parts: list[Part]) -> str:
             if asks_who(settings) and not (store.keys.has_admin or store.people.has_admin):
                 return (
                     f"on {settings.host} the service asks everybody who they are (GLOVECAL_HOST, "
-                    "GLOVECAL_LOGIN), and there is no admin yet; make one: glovecal key add NAME --role admin"
+                    "GLOVECAL_LOGIN, GLOVECAL_PROXIES), and there is no admin yet; make one: glovecal key "
+                    "add NAME --role admin"
                 )
     except (GlovecalError, OSError) as error:
         return f"the store cannot be opened: {reason_of(error)}"
@@ -446,7 +447,8 @@ def web(settings: Settings, stopped: Event, started: Callable[[], None]) -> None
         login = WebLogin(settings, app.state.allowed_hosts)
         context = login.context
         Thread(target=login.follow, args=(stopped,), daemon=True).start()
-    server = uvicorn.Server(server_config(app, settings.host, settings.port, context))
+    config = server_config(app, settings.host, settings.port, context, settings.known_proxies)
+    server = uvicorn.Server(config)
     setattr(server, "capture_signals", nullcontext)  # noqa: B010  signals are ours, uvicorn takes them over
     Thread(target=_follow_server, args=(server, stopped, started), daemon=True).start()
     server.run()

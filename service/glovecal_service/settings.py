@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,6 +55,9 @@ class Settings(BaseSettings):
     allowed_hosts: str = ""
     """Names and addresses that the service answers to, separated by commas; "": those of loopback and those
     in its certificate."""
+    proxies: str = ""
+    """Addresses and networks of reverse proxies, separated by commas: what they say of who asks, and how, is
+    believed (X-Forwarded-For, X-Forwarded-Proto)."""
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8600
     login: Literal["beyond loopback", "always"] = "beyond loopback"
@@ -98,6 +102,21 @@ class Settings(BaseSettings):
             if not _HOST.match(name):
                 raise ValueError(f"{name!r} is neither the name nor the address of a computer")
         return allowed_hosts
+
+    @field_validator("proxies")
+    @classmethod
+    def _proxies_are_addresses(cls, proxies: str) -> str:
+        for each in filter(None, (part.strip() for part in proxies.split(","))):
+            try:
+                network = ipaddress.ip_network(each)
+            except ValueError as error:
+                raise ValueError(
+                    f"{each!r} is neither the address of a proxy, such as 192.168.1.5, nor a network, such "
+                    "as 172.18.0.0/16"
+                ) from error
+            if network.prefixlen == 0:
+                raise ValueError(f"{each} is everybody: name the proxies alone")
+        return proxies
 
     @field_validator("site")
     @classmethod
@@ -158,6 +177,11 @@ class Settings(BaseSettings):
     def linked_routers(self) -> list[str]:
         """Endpoints."""
         return [each.strip() for each in self.zenoh_peers.split(",") if each.strip()]
+
+    @property
+    def known_proxies(self) -> list[str]:
+        """Addresses and networks."""
+        return [each.strip() for each in self.proxies.split(",") if each.strip()]
 
     @property
     def oidc_secret(self) -> str:

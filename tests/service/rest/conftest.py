@@ -62,9 +62,8 @@ def serve() -> Iterator[Callable[..., str]]:
     def start(settings: Settings, *, body_patience_s: float = 30.0) -> str:
         listener = socket.create_server(("127.0.0.1", 0))
         port = listener.getsockname()[1]
-        server = uvicorn.Server(
-            server_config(create_app(settings, body_patience_s=body_patience_s), "127.0.0.1", port)
-        )
+        app = create_app(settings, body_patience_s=body_patience_s)
+        server = uvicorn.Server(server_config(app, "127.0.0.1", port, proxies=settings.known_proxies))
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
         running.append((server, thread))

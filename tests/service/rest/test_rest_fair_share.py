@@ -100,9 +100,14 @@ def test_one_address_leaves_connections_for_others(
     monkeypatch.setattr(server.PatientH11Protocol, "header_deadline_s", 600.0)
     monkeypatch.setattr(server, "is_loopback", lambda address: address != "127.0.0.1")
     url = serve(Settings(data=tmp_path / "data"))
-    port = int(url.rpartition(":")[2])
-    opened = [socket.create_connection(("127.0.0.1", port), timeout=120) for _ in range(3)]
+    behind_proxy = serve(Settings(data=tmp_path / "other", proxies="127.0.0.0/31"))
+    opened = [
+        socket.create_connection(("127.0.0.1", int(each.rpartition(":")[2])), timeout=120)
+        for each in (url, behind_proxy)
+        for _ in range(3)
+    ]
     try:
+        assert httpx.get(f"{behind_proxy}/v1/health/live", trust_env=False).status_code == 200
         with pytest.raises(httpx.TransportError):
             httpx.get(f"{url}/v1/health/live", trust_env=False)
         other = httpx.HTTPTransport(local_address="127.0.0.2")

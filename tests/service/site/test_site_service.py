@@ -16,7 +16,8 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
-from site_support import eventually, free_port
+from served_site import GLOVECAL, Served
+from site_support import eventually
 
 from glovecal_client import open_client
 from glovecal_client.keys import all_services
@@ -24,32 +25,6 @@ from glovecal_client.rest import NoService, RestClient
 from glovecal_client.session import ask_json
 from glovecal_client.site.certificates import client_context
 from glovecal_client.site.member import read_member
-
-GLOVECAL = [sys.executable, "-m", "glovecal_service.cli.command"]
-
-
-class Served:
-    """A data folder, free ports, and the command with them."""
-
-    def __init__(self, place: Path) -> None:
-        self.place = place
-        self.zenoh, self.port = f"tls/0.0.0.0:{free_port()}", free_port()
-        self.environment = {name: value for name, value in os.environ.items() if "GLOVECAL" not in name} | {
-            "GLOVECAL_DATA": str(place / "data"),
-            "GLOVECAL_ZENOH": self.zenoh,
-            "GLOVECAL_PORT": str(self.port),
-            "GLOVECAL_HOST": "0.0.0.0",
-        }
-
-    def run(self, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*GLOVECAL, *words],
-            env=self.environment | more,
-            cwd=self.place,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
 
 
 @pytest.fixture(scope="module")

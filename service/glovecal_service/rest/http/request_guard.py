@@ -65,8 +65,8 @@ class RequestGuard:
 
 
 def asks_who(settings: Settings) -> bool:
-    """Whether whoever asks has to prove who they are."""
-    return settings.login == "always" or not is_loopback(settings.host)
+    """Whether whoever asks has to prove who they are. A proxy on this computer lets others in, too."""
+    return settings.login == "always" or not is_loopback(settings.host) or bool(settings.known_proxies)
 
 
 def _is_plain_path(path: str, raw_path: bytes) -> bool:

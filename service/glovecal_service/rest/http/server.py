@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import socket
 import ssl
+from collections.abc import Sequence
+from ipaddress import ip_address, ip_network
 from typing import Any
 
 import uvicorn
@@ -38,10 +40,15 @@ class PatientH11Protocol(H11Protocol):
 
     def _is_one_too_many(self) -> bool:
         address = self.client[0] if self.client else ""
-        if len(self.connections) <= MOST_OF_ONE_ADDRESS or is_loopback(address):
+        if len(self.connections) <= MOST_OF_ONE_ADDRESS or is_loopback(address) or self._is_proxy(address):
             return False
         clients = (getattr(each, "client", None) for each in self.connections)
         return sum(client is not None and client[0] == address for client in clients) > MOST_OF_ONE_ADDRESS
+
+    def _is_proxy(self, address: str) -> bool:
+        """Behind one are many computers."""
+        known = self.config.forwarded_allow_ips if self.config.proxy_headers else ()
+        return any(ip_address(address) in ip_network(each) for each in known)
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -93,9 +100,11 @@ def new_event_loop() -> asyncio.AbstractEventLoop:
     return Loop()
 
 
-def server_config(app: Any, host: str, port: int, context: ssl.SSLContext | None = None) -> uvicorn.Config:
+def server_config(
+    app: Any, host: str, port: int, context: ssl.SSLContext | None = None, proxies: Sequence[str] = ()
+) -> uvicorn.Config:
     """The configuration to start ``uvicorn.Server`` with, for ``app`` from ``create_app``; with a ``context``
-    it speaks TLS.
+    it speaks TLS. ``proxies``: addresses and networks whose X-Forwarded-For and -Proto are believed.
 
     Server-sent events stay open for ever by design, hence the bound on the graceful shutdown. Logs go
     through ``logging`` as the process has set it up; the access log is the application's own.
@@ -111,7 +120,8 @@ def server_config(app: Any, host: str, port: int, context: ssl.SSLContext | None
         access_log=False,
         server_header=False,
         date_header=True,
-        proxy_headers=False,
+        proxy_headers=bool(proxies),
+        forwarded_allow_ips=list(proxies),
         ws_per_message_deflate=False,  # a live hand's floats hardly get shorter, thirty times a second
         timeout_keep_alive=15,
         timeout_graceful_shutdown=3,
