@@ -42,7 +42,7 @@ class Computers:
             ip("-n", there, "address", "add", f"{address}/24", "dev", "eth0")
             ip("-n", there, "link", "set", "eth0", "up")
             self.folder(name).mkdir()
-        subprocess.run(self._command("service", "true"), check=True, capture_output=True)
+        subprocess.run(self._command(next(iter(self._addresses)), "true"), check=True, capture_output=True)
 
     def folder(self, computer: str) -> Path:
         return self.place / computer
