@@ -1,8 +1,8 @@
 # The Glovecal service: zenoh router, real-time prediction, REST, studio, cameras, training workers.
 #   docker build -f docker/service.Dockerfile -t glovecal-service .
 #   docker build -f docker/service.Dockerfile --build-arg EXTRAS="studio postgres" -t glovecal-service .   (without cameras)
-# compose.yaml beside this file runs it; so does (RUN="docker run --init --read-only --tmpfs /tmp --cap-drop ALL
-# --security-opt no-new-privileges -v glovecal:/data"):
+# compose.yaml beside this file runs it; so does (RUN="docker run --hostname glovecal --init --read-only --tmpfs /tmp
+# --cap-drop ALL --security-opt no-new-privileges -v glovecal:/data"):
 #   $RUN glovecal-service glovecal site init --host NAME, then glovecal key add NAME --role admin;
 #   $RUN -e GLOVECAL_SITE_FILE=/data/site/service.glovecal -p 8600:8600 -p 7447:7447 glovecal-service
 #
@@ -55,7 +55,7 @@ ENV PATH=/opt/glovecal/code/bin:/opt/glovecal/bin:$PATH HOME=/tmp \
     GLOVECAL_DATA=/data GLOVECAL_HOST=0.0.0.0 GLOVECAL_PORT=8600 GLOVECAL_ZENOH=tls/0.0.0.0:7447
 USER 10001
 VOLUME /data
-EXPOSE 8600 7447
+EXPOSE 8600 7447 8601
 STOPSIGNAL SIGTERM
 # Docker images keep this; images in the OCI format have no health check, and compose.yaml and Kubernetes name it.
 HEALTHCHECK --interval=10s --timeout=5s --start-period=90s CMD \

@@ -26,11 +26,12 @@ class Pulses:
 
     def expect(self, processes: Iterable[str]) -> None:
         """A service begins, with these; no others are looked for."""
-        self._folder.mkdir(mode=0o700, exist_ok=True)
-        for earlier in self._folder.iterdir():
-            earlier.unlink(missing_ok=True)
-        for process in processes:
-            (self._folder / process).touch()
+        with suppress(OSError):  # a full disk: those that come to live are looked for
+            self._folder.mkdir(mode=0o700, exist_ok=True)
+            for earlier in self._folder.iterdir():
+                earlier.unlink(missing_ok=True)
+            for process in processes:
+                (self._folder / process).touch()
 
     def beat(self, process: str, stopped: Event) -> None:
         """In a thread of the process, until ``stopped``."""

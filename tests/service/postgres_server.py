@@ -8,8 +8,11 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import psutil
 import psycopg
 
 
@@ -47,6 +50,21 @@ class PostgresServer:
             except RuntimeError:
                 time.sleep(0.2)
         raise RuntimeError(f"PostgreSQL does not start again: {(self.folder / 'log').read_text()[-500:]}")
+
+    @contextmanager
+    def hanging(self) -> Iterator[None]:
+        """It takes connections and answers nothing."""
+        pid = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
+        postmaster = psutil.Process(pid)
+        processes = [*postmaster.children(recursive=True), postmaster]
+        for each in processes:
+            each.suspend()
+        try:
+            yield
+        finally:
+            for each in processes[::-1]:
+                with suppress(psutil.NoSuchProcess):
+                    each.resume()
 
     def stop(self) -> None:
         self._run("pg_ctl", "-w", "-t", "30", "-m", "immediate", "stop")

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -137,7 +138,7 @@ def listener(process: subprocess.Popen[str], port: int) -> int:
 
 
 def status_and_detail(port: int, route: str) -> tuple[int, str]:
-    answer = httpx.get(f"http://127.0.0.1:{port}/v1/health/{route}", timeout=5.0)
+    answer = httpx.get(f"http://127.0.0.1:{port}/v1/health/{route}", timeout=120.0)
     return answer.status_code, answer.json().get("detail", "")
 
 
@@ -151,7 +152,7 @@ def test_it_is_healthy_only_while_each_of_its_processes_lives(tmp_path: Path) ->
         assert process.stdout.readline().startswith("Glovecal is running")
         assert health(port) == (0, "Healthy: real time, real time 2, recorder, recorder 2, web.\n")
         assert status_and_detail(port, "ready") == (200, "")
-        by_start = sorted(children(process), key=lambda child: psutil.Process(child).create_time())
+        by_start = sorted(children(process))
         for number, name in ((0, "real time"), (1, "real time 2"), (3, "recorder 2")):
             os.kill(by_start[number], signal.SIGSTOP)
             eventually(lambda: health(port)[0] == 1, f"{name} is missed")
@@ -182,6 +183,11 @@ def test_without_its_database_it_lives_and_is_not_ready(tmp_path: Path, own_post
                 return poses.wait(0.02) is not None
 
             eventually(pose_comes, "the first pose")
+            with own_postgres.hanging(), ThreadPoolExecutor(60) as people:
+                asked = [people.submit(status_and_detail, port, "ready") for _ in range(60)]
+                assert health(port) == (0, "Healthy: real time, recorder, web.\n"), "it waits for no thread"
+                eventually(pose_comes, "poses go on")
+                assert {answer.result()[0] for answer in asked} == {503}
             own_postgres.stop()
             eventually(lambda: status_and_detail(port, "ready")[0] == 503, "not ready")
             assert "the database does not work" in status_and_detail(port, "ready")[1]

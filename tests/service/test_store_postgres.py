@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 
-import psutil
 import pytest
 from jobs_waiting import wait_for
 from realtime_support import free_endpoint
@@ -97,22 +96,13 @@ def test_a_server_that_hangs_is_told_at_once_and_a_long_statement_is_waited_for(
         store.subjects.create("anna")
         with store.database.read() as connection:
             assert connection.scalar(text("SELECT 7 FROM pg_sleep(3)")) == 7
-        postmaster = psutil.Process(
-            int((own_postgres.folder / "data" / "postmaster.pid").read_text().split()[0])
-        )
-        processes = [*postmaster.children(recursive=True), postmaster]
-        for each in processes:
-            each.suspend()
-        try:
+        with own_postgres.hanging():
             asked = [threading.Thread(target=refused, args=(store,)) for _ in range(4)]
             for each in asked:
                 each.start()
             for each in asked:
                 each.join(60)
                 assert not each.is_alive(), "it waits for the server that hangs"
-        finally:
-            for each in processes[::-1]:
-                each.resume()
         wait_for(lambda: answers(store))
         assert [each.name for each in store.subjects.list()] == ["anna"]
 
