@@ -29,7 +29,7 @@ CLIPPED_FRAMES, CLIPPED_SHARE, CLIPPED_S = 5, 0.04, 0.2
 """Frames in a row at one end of the range, and their share of all frames and seconds together."""
 OTHERS_MOVE = 0.5
 """Share of the other channels that change in most of the frames meanwhile."""
-SAME_SHARE, FEWEST_STEPS = 0.99, 30
+SAME_SHARE, STEPS_WIDE = 0.99, 30
 """Of the frames in which two channels lie within a step of each other, over a range of so many."""
 
 
@@ -120,7 +120,7 @@ def _same(readings: np.ndarray, names: Sequence[str]) -> list[ChannelFault]:
     """Compared by twos; the rounding of one channel may differ from the other's by a step."""
     steps = [smallest_step(column) for column in readings.T]
     moving = [
-        index for index, step in enumerate(steps) if step and np.ptp(readings[:, index]) > FEWEST_STEPS * step
+        index for index, step in enumerate(steps) if step and np.ptp(readings[:, index]) > STEPS_WIDE * step
     ]
     found = []
     for one, other in combinations(moving, 2):
