@@ -92,6 +92,8 @@ class PoseLoop:
         self._looked_for_stale_ns = 0
         self._collected_ns = clock_ns()
         self._failed: set[str] = set()
+        self.turns = 0
+        """How often it looked for frames; others may read it."""
 
     @property
     def lanes(self) -> list[GlovePipeline]:
@@ -104,6 +106,7 @@ class PoseLoop:
 
     def step(self) -> None:
         """Wait for a frame, a tenth of a second at most, then serve until nothing is pending."""
+        self.turns += 1
         first = self._arrivals.wait()
         if first is not None:
             self._enqueue([first])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import secrets
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from threading import Event, Thread
 
 import zenoh
@@ -38,6 +40,10 @@ GIL_SWITCH_S = 0.0005
 """Longest time another thread of this process keeps a frame waiting (Python's default is ten times that)."""
 
 LINKED_WITHIN_S = 1.0
+LOOKS_EVERY_S = 1.0
+LOOKS_IN_VAIN = 10
+"""The loop of poses makes a turn ten times a second, also without frames. One that makes none while others
+of its process run, however often it is looked at, does not come back."""
 
 _log = logging.getLogger("glovecal.realtime")
 
@@ -127,6 +133,7 @@ def _serve(
             ("models", watcher.run),
             ("status", status.run),
             ("explanations", explanations.run),
+            ("watch", partial(end_if_it_stands_still, loop)),
             *rules,
         )
     ]
@@ -139,6 +146,21 @@ def _serve(
     arrivals.close()
     if failures:
         raise RealTimeFailed("; ".join(failures))
+
+
+def end_if_it_stands_still(loop: PoseLoop, stopped: Event) -> None:
+    """End the process, which is started anew, where no frame becomes a pose any more. Looks are counted, not
+    seconds: a process that was suspended has lost those too. Nothing is put away first: that may hang, too.
+    """
+    turns, in_vain = loop.turns, 0
+    while not stopped.wait(LOOKS_EVERY_S):
+        in_vain = in_vain + 1 if loop.turns == turns else 0
+        turns = loop.turns
+        if in_vain >= LOOKS_IN_VAIN:
+            _log.error(
+                "the loop of poses stands still since %.0f s: this process ends", in_vain * LOOKS_EVERY_S
+            )
+            os._exit(1)
 
 
 def _thread(name: str, work: Callable[[Event], None], stopped: Event, failures: list[str]) -> Thread:
