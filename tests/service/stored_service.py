@@ -22,12 +22,15 @@ from glovecal_client.capture.cyberglove import find_port
 from glovecal_models.calibration.artifact import dump
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.sampling.catalogue import make_protocol
+from glovecal_models.sampling.engine import begin_sampling
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.rest.app import create_app
 from glovecal_service.rest.in_process import PortalTransport
 from glovecal_service.settings import Settings
+from glovecal_service.store.store import Store
 
 ODD = "fist ${\\frac{ %s <b>$"
 """A take's name that mathtext, printf and HTML read otherwise."""
@@ -56,43 +59,50 @@ def stored_service(folder: Path, zenoh: str) -> Iterator[StoredService]:
             transport=PortalTransport(app, portal), base_url="http://localhost/v1", timeout=600
         ) as http,
     ):
-        store = app.state.parts.store
-        store.subjects.create("anna")
-        store.layouts.put(LAYOUT)
-        takes = [_odd(number) for number in range(3)]
-        rows = store.takes.add_all(takes, subject="anna", layout=LAYOUT.name, source="import")
-        hashes = [row.artifact for row in rows]
-        model = dump(train(takes, LAYOUT, "anna", TrainingSettings("linear"), take_hashes=hashes))
-        facts = {"takes": [{"id": row.id, "name": row.name, "artifact": row.artifact} for row in rows]}
-        record = store.models.add(
-            model, subject="anna", layout=LAYOUT.name, method="linear", parent=None, facts=facts
-        )
-        store.models.activate(record.id)
-        job = store.jobs.create("train", {"takes": []}, subject="anna")
-        store.gloves.seen("left", META)
-        recording = store.recordings.request("left", name="walk", subject="anna", wearing="w")
-        sampling = store.samplings.create(
-            glove="left", subject="anna", wearing="w", layout=LAYOUT.name, document={"step": 3, "at_s": 0.5}
-        )
-        files = _files(folder, model, takes[0])
-        kind = {"Content-Type": "application/octet-stream"}
-        video = http.post("/uploads", content=files["video"], headers=kind).json()["sha256"]
-        ids = {
-            "id": rows[0].id, "take": rows[0].id, "takes": [row.id for row in rows], "model": record.id,
-            "model.id": record.id, "models": [record.id], "beside": [record.id], "job.id": job.id,
-            "sampling.id": sampling.id, "recording.id": recording.id, "upload": video,
-        }  # fmt: skip
-        known = {
-            "subject": "anna", "name": "anna", "layout": LAYOUT.name, "glove": "left", "wearing": "w",
-            "sensors": list(LAYOUT.sensors), "readings": [[90.0, 120.0, 130.0]], "rotation": "I_PIP",
-            "rotations": ["I_PIP"], "rotations[]": "I_PIP", "column": "angle", "method": "linear",
-            "effect": "nonlinearity", "effects": ["nonlinearity"], "effect.name": "nonlinearity",
-            "declaration": "name = strap; columns = c.supply_v * own; unit = deg", "event": "pause",
-            "still": {rows[0].id: "IM_ABD"}, "range_takes": None, "keys": ["hand_length"],
-            "simulated": {"I_DIP": "2/3 * I_PIP"}, "text": CALIBRATION, "right": ["A"], "left": ["A"],
-            "source": "tape:1",  # a right one would start a camera
-        }  # fmt: skip
-        yield StoredService(http, known | ids, files)
+        yield fill(app.state.parts.store, http, folder)
+
+
+def fill(
+    store: Store, http: httpx.Client, folder: Path, *, subject: str = "anna", glove: str = "left"
+) -> StoredService:
+    """What ``stored_service`` has; for another subject and glove beside it."""
+    store.subjects.create(subject)
+    store.layouts.put(LAYOUT)
+    takes = [_odd(number) for number in range(3)]
+    rows = store.takes.add_all(takes, subject=subject, layout=LAYOUT.name, source="import")
+    hashes = [row.artifact for row in rows]
+    model = dump(train(takes, LAYOUT, subject, TrainingSettings("linear"), take_hashes=hashes))
+    facts = {"takes": [{"id": row.id, "name": row.name, "artifact": row.artifact} for row in rows]}
+    record = store.models.add(
+        model, subject=subject, layout=LAYOUT.name, method="linear", parent=None, facts=facts
+    )
+    store.models.activate(record.id)
+    job = store.jobs.create("train", {"takes": []}, subject=subject)
+    store.gloves.seen(glove, META)
+    recording = store.recordings.request(glove, name="walk", subject=subject, wearing="w")
+    going_on = begin_sampling(make_protocol("fk_only", LAYOUT), LAYOUT.sensors).to_document()
+    sampling = store.samplings.create(
+        glove=glove, subject=subject, wearing="w", layout=LAYOUT.name, document=going_on
+    )
+    files = _files(folder, model, takes[0])
+    kind = {"Content-Type": "application/octet-stream"}
+    video = http.post("/uploads", content=files["video"], headers=kind).json()["sha256"]
+    ids = {
+        "id": rows[0].id, "take": rows[0].id, "takes": [row.id for row in rows], "model": record.id,
+        "model.id": record.id, "models": [record.id], "beside": [record.id], "job.id": job.id,
+        "sampling.id": sampling.id, "recording.id": recording.id, "upload": video,
+    }  # fmt: skip
+    known = {
+        "subject": subject, "name": subject, "layout": LAYOUT.name, "glove": glove, "wearing": "w",
+        "sensors": list(LAYOUT.sensors), "readings": [[90.0, 120.0, 130.0]], "rotation": "I_PIP",
+        "rotations": ["I_PIP"], "rotations[]": "I_PIP", "column": "angle", "method": "linear",
+        "effect": "nonlinearity", "effects": ["nonlinearity"], "effect.name": "nonlinearity",
+        "declaration": "name = strap; columns = c.supply_v * own; unit = deg", "event": "pause",
+        "still": {rows[0].id: "IM_ABD"}, "range_takes": None, "keys": ["hand_length"],
+        "simulated": {"I_DIP": "2/3 * I_PIP"}, "text": CALIBRATION, "right": ["A"], "left": ["A"],
+        "source": "tape:1",  # a right one would start a camera
+    }  # fmt: skip
+    return StoredService(http, known | ids, files)
 
 
 CALIBRATION = "{'cyberglove_calibration': [['I_MCP', [[10, 0], [200, 90]]]]}"

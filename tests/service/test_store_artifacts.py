@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.store import blobs
-from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, Artifacts, FolderBlobs, ObjectBlobs
+from glovecal_service.store import object_blobs
+from glovecal_service.store.blobs import ABANDONED_AFTER_S, TEMPORARY, Artifacts, FolderBlobs
 from glovecal_service.store.errors import NotFound, StoreUnavailable
+from glovecal_service.store.object_blobs import ObjectBlobs
 
 
 @pytest.fixture(params=["folder", "object store"])
@@ -133,8 +134,6 @@ def test_an_unusable_object_store_is_named(tmp_path):
 
 def test_an_object_store_that_hangs_is_told_and_what_was_read_before_is_read_again(tmp_path, monkeypatch):
     """Something that accepts and never answers stands for it."""
-    monkeypatch.setattr(blobs, "READ_WITHIN_S", 1)
-    monkeypatch.setattr(blobs, "WRITTEN_WITHIN_S", 1)
     (tmp_path / "objects").mkdir()
     before = Artifacts(ObjectBlobs((tmp_path / "objects").as_uri(), tmp_path / "cache"))
     name = before.put(b"a model")
@@ -156,7 +155,7 @@ def test_an_object_store_that_hangs_is_told_and_what_was_read_before_is_read_aga
 
 
 def test_the_oldest_make_room_in_the_cache(tmp_path, monkeypatch):
-    monkeypatch.setattr(blobs, "CACHE_BYTES", 250_000)
+    monkeypatch.setattr(object_blobs, "CACHE_BYTES", 250_000)
     (tmp_path / "objects").mkdir()
     artifacts = Artifacts(ObjectBlobs((tmp_path / "objects").as_uri(), tmp_path / "cache"))
     names = [artifacts.put(os.urandom(100_000)) for _ in range(4)]

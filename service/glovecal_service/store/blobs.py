@@ -1,4 +1,4 @@
-"""Artifacts, named by their sha256, and where they lie: a local folder, or an object store through obstore.
+"""Artifacts, named by their sha256, and where they lie: a local folder, or an object store (``ObjectBlobs``).
 
 obstore has a local store too, but that one renames without ``fsync`` (seen with strace, version 0.12.1): a
 power cut could leave an empty file under the right name. So the folder is written here.
@@ -9,26 +9,20 @@ from __future__ import annotations
 import errno
 import hashlib
 import math
-import os
 import re
 import secrets
 import shutil
 import time
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager, suppress
-from datetime import timedelta
 from pathlib import Path
-from typing import Any, Protocol, cast
-
-import obstore
-import obstore.store
+from typing import Protocol
 
 from glovecal_client.encryption.kept_file import decrypted, encrypted, is_encrypting
 from glovecal_client.errors import DamagedFile
 from glovecal_client.operating_system import move_over, sync_file
-from glovecal_client.private_files import PRIVATE_FOLDER
 from glovecal_models.errors import BadInput, DamagedArtifact
-from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailable
+from glovecal_service.store.errors import NotFound, StorageFull
 from glovecal_service.store.packing import packed, unpacked
 
 TEMPORARY = ".writing-"
@@ -107,122 +101,6 @@ class FolderBlobs:
             with suppress(OSError):
                 if time.time() - leftover.stat().st_mtime > ABANDONED_AFTER_S:
                     leftover.unlink()
-
-
-READ_WITHIN_S, WRITTEN_WITHIN_S = 4, 20
-"""By themselves they would wait for minutes."""
-CACHE_BYTES = 2_000_000_000
-
-
-class ObjectBlobs:
-    """A bucket or a prefix of one: ``s3://bucket/prefix``, credentials from the usual environment.
-
-    What was read or written last lies in a folder here as well, and is read from there while the object store
-    is away: real time that is started again has its models.
-    """
-
-    def __init__(self, url: str, cache: Path) -> None:
-        """``cache``: a folder for ``CACHE_BYTES``."""
-        self._cache = cache
-        with full_disk_named(cache):
-            cache.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
-        try:
-            self._store, self._writing = (
-                _opened(url, within_s) for within_s in (READ_WITHIN_S, WRITTEN_WITHIN_S)
-            )
-        except (obstore.exceptions.BaseError, ValueError, TypeError) as error:
-            raise BadInput(
-                f"GLOVECAL_ARTIFACTS: {url!r} is not the address of an object store; write it like s3://bucket/prefix"
-            ) from error
-        self._url = url
-
-    @property
-    def place(self) -> str:
-        return self._url
-
-    def write(self, name: str, content: bytes) -> None:
-        with self._answering():
-            obstore.put(self._writing, name, content)
-        self._keep(name, content)
-
-    def read(self, name: str) -> bytes | None:
-        try:
-            with self._answering():
-                content = bytes(obstore.get(self._store, name).bytes())
-        except (FileNotFoundError, obstore.exceptions.NotFoundError):
-            return None
-        except StoreUnavailable:
-            with suppress(OSError):
-                return (self._cache / name).read_bytes()
-            raise
-        self._keep(name, content)
-        return content
-
-    def _keep(self, name: str, content: bytes) -> None:
-        """In the cache, whose oldest files make room; a full disk does without."""
-        with suppress(OSError, StorageFull):
-            file = self._cache / name
-            if file.exists() and file.stat().st_size == len(content):
-                os.utime(file)
-                return
-            write_durably(file, content)
-            files = sorted(
-                (each.stat().st_mtime, each.stat().st_size, each) for each in self._cache.iterdir()
-            )
-            excess = sum(size for _, size, _ in files) - CACHE_BYTES
-            for _, size, old in files:
-                if excess <= 0:
-                    return
-                old.unlink(missing_ok=True)
-                excess -= size
-
-    def exists(self, name: str) -> bool:
-        with self._answering():
-            try:
-                obstore.head(self._store, name)
-            except (FileNotFoundError, obstore.exceptions.NotFoundError):
-                return False
-            return True
-
-    def remove(self, name: str) -> None:
-        (self._cache / name).unlink(missing_ok=True)
-        with self._answering(), suppress(FileNotFoundError, obstore.exceptions.NotFoundError):
-            obstore.delete(self._store, name)
-
-    def stamp(self, name: str) -> Hashable | None:
-        with self._answering():
-            try:
-                found = obstore.head(self._store, name)
-            except (FileNotFoundError, obstore.exceptions.NotFoundError):
-                return None
-            return found["size"], found["last_modified"], found["e_tag"]
-
-    @contextmanager
-    def _answering(self) -> Iterator[None]:
-        try:
-            yield
-        except obstore.exceptions.NotFoundError:
-            raise
-        except obstore.exceptions.BaseError as error:
-            raise StoreUnavailable(
-                f"the object store {self._url} does not answer; is its address right, and may this "
-                "service log in?"
-            ) from error
-
-
-def _opened(url: str, within_s: float) -> obstore.store.ObjectStore:
-    """No request takes longer than that."""
-    options = {"connect_timeout": "2s", "timeout": f"{within_s}s"}
-    if os.environ.get("AWS_ALLOW_HTTP", "").lower() in (
-        "true",
-        "1",
-    ):  # our options stand in for those named there
-        options["allow_http"] = "true"
-    return obstore.store.from_url(
-        url,
-        client_options=cast(Any, options),
-        retry_config={"max_retries": 1, "retry_timeout": timedelta(seconds=within_s)},
-    )
 
 
 def write_durably(path: Path, content: bytes) -> None:

@@ -41,7 +41,7 @@ from glovecal_service.store.actor import OPTION, Actor
 from glovecal_service.store.audit_trail import watch_changes, written_down
 from glovecal_service.store.errors import StorageFull, StoreDamaged, StoreUnavailable
 from glovecal_service.store.scope import narrow_statements
-from glovecal_service.store.server_watch import ServerWatch
+from glovecal_service.store.server_watch import watched_connections
 from glovecal_service.store.texts import json_text
 
 
@@ -83,7 +83,8 @@ class Database:
         """Raises BadInput if the URL is not one of SQLite or PostgreSQL (through psycopg 3)."""
         self.engine = _engine(url)
         self.is_sqlite = self.engine.dialect.name == "sqlite"
-        self._watched = nullcontext if self.is_sqlite else ServerWatch(self.engine).transaction
+        what = f"the database {self.name}"
+        self._watched = nullcontext if self.is_sqlite else watched_connections(self.engine, what).waiting
         narrow_statements(self.engine)
         watch_changes(self.engine)
         self._writing = self.engine.execution_options(glovecal_begin="BEGIN IMMEDIATE")
@@ -166,8 +167,9 @@ class Database:
 
     @property
     def name(self) -> str:
-        """The URL without its password, for messages."""
-        return self.engine.url.render_as_string(hide_password=True)
+        """The URL without its password and its driver, for messages."""
+        url = self.engine.url
+        return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
 
 
 def _engine(url: str | URL) -> Engine:
@@ -250,8 +252,9 @@ def _meaning(error: DatabaseError, database: Database) -> Exception:
         )
     if isinstance(error, IntegrityError):
         return error  # says that a name is taken, to who asked for it
+    said = f" ({code})" if code.isupper() or code.isdigit() else ""  # else the driver's word
     return StoreUnavailable(
-        f"the database {name} does not answer now ({code}); is it running, may this user log in, and is the "
+        f"the database {name} does not answer now{said}; is it running, may this user log in, and is the "
         "address right? The log has what it said"
     )
 

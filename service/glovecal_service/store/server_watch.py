@@ -1,8 +1,7 @@
-"""Nobody waits for a database server that stopped answering: its connections are given up, and who waits on
-one is told.
+"""Nobody waits for a server that stopped answering: who waits for it is told.
 
-A server that hangs, or a network that swallows packets, keeps a statement waiting for as long as TCP does.
-Whether it hangs or only takes long over one statement is found by asking it something else.
+A server that hangs, or a network that swallows packets, keeps a request waiting for as long as TCP does.
+Whether it hangs or only takes long over one request is found by asking it something else.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -19,7 +18,7 @@ from sqlalchemy import Engine, event
 
 from glovecal_service.store.errors import StoreUnavailable
 
-LATE_AFTER_S = 2.0
+LATE_AFTER_S = 1.5
 ANSWERED_WITHIN_S = 2
 """By a server that is there; psycopg takes whole seconds, from 2 on."""
 LOOK_EVERY_S, ENDS_AFTER_S = 0.25, 60.0
@@ -27,77 +26,91 @@ ASKED_AGAIN_AFTER_S = 2.0
 
 
 class ServerWatch:
-    """Of one engine with psycopg connections. Its thread ends when nobody has asked for a minute."""
+    """Of one server. Its thread ends when nobody has asked for a minute."""
 
-    def __init__(self, engine: Engine) -> None:
-        self._engine = engine
+    def __init__(
+        self, what: str, answers: Callable[[], bool], give_up: Callable[[], None] = lambda: None
+    ) -> None:
+        """``answers``: whether the server answers a short question, within ``ANSWERED_WITHIN_S``; ``give_up``
+        ends what waits for it."""
+        self._what = what
+        self._answers, self._give_up = answers, give_up
         self._lock = threading.Lock()
         self._waiting: dict[object, float] = {}
-        """Transactions, and since when."""
-        self._connections: set[Any] = set()
-        self._hung_at = -ASKED_AGAIN_AFTER_S
-        self._is_looking = False
-        event.listen(engine, "do_connect", self._refuse)
-        event.listen(engine, "connect", self._note)
-        event.listen(engine, "close", self._forget)
-        event.listen(engine, "close_detached", self._forget)
+        """Who waits, and since when."""
+        self._is_away = self._is_looking = False
+        self._asked_at = 0.0
 
     @contextmanager
-    def transaction(self) -> Iterator[None]:
-        """Raises StoreUnavailable at once, for a moment after the server was found hanging."""
-        self._refuse()
+    def waiting(self) -> Iterator[None]:
+        """Raises StoreUnavailable at once while the server is known not to answer."""
         mine = object()
         with self._lock:
-            self._waiting[mine] = time.monotonic()
+            self._asked_at = time.monotonic()
+            if not self._is_away:
+                self._waiting[mine] = self._asked_at
             if not self._is_looking:
                 self._is_looking = True
-                threading.Thread(target=self._look, name="database", daemon=True).start()
+                threading.Thread(target=self._look, name=f"watch of {self._what}", daemon=True).start()
+        self.require_answering()
         try:
             yield
         finally:
             with self._lock:
                 self._waiting.pop(mine, None)
 
-    def _refuse(self, *_: object) -> None:
-        """Nobody connects anew meanwhile either, as who was given up would."""
-        if time.monotonic() - self._hung_at < ASKED_AGAIN_AFTER_S:
-            raise StoreUnavailable(
-                f"the database {self._engine.url.render_as_string(hide_password=True)} does not answer; is "
-                "its server running?"
-            )
+    def require_answering(self) -> None:
+        """Raises StoreUnavailable."""
+        if self._is_away:
+            raise StoreUnavailable(f"{self._what} does not answer; is its server running?")
 
-    def _note(self, connection: Any, _record: object) -> None:
-        self._connections.add(connection)
-
-    def _forget(self, connection: Any, *_: object) -> None:
-        self._connections.discard(connection)
+    def note_away(self) -> None:
+        """Somebody found that it cannot be reached, while ``waiting``: the others are told at once."""
+        self._is_away = True
 
     def _look(self) -> None:
-        asked_at = time.monotonic()
         while True:
             time.sleep(LOOK_EVERY_S)
             with self._lock:
                 now = time.monotonic()
-                asked_at = now if self._waiting else asked_at
-                if now - asked_at > ENDS_AFTER_S:
-                    self._is_looking = False
+                is_late = min(self._waiting.values(), default=now) < now - LATE_AFTER_S
+                if not self._waiting and now - self._asked_at > ENDS_AFTER_S:
+                    self._is_away = self._is_looking = False
                     return
-                late = min(self._waiting.values(), default=now) < now - LATE_AFTER_S
-            if late and not self._answers():
-                self._hung_at = time.monotonic()
-                for connection in list(self._connections):
-                    _give_up(connection)
-            elif late:
+            if self._is_away:
+                self._is_away = not self._answers()
+            elif is_late and not self._answers():
+                self._is_away = True
+                self._give_up()
+            elif is_late:
                 time.sleep(ASKED_AGAIN_AFTER_S)
 
-    def _answers(self) -> bool:
-        arguments, options = self._engine.dialect.create_connect_args(self._engine.url)
-        options["connect_timeout"] = ANSWERED_WITHIN_S
-        try:
-            with self._engine.dialect.loaded_dbapi.connect(*arguments, **options):
-                return True
-        except Exception:  # whatever a driver has for it
-            return False
+
+def watched_connections(engine: Engine, what: str) -> ServerWatch:
+    """Of an engine with psycopg connections, which are given up where the server hangs. Nobody connects anew
+    meanwhile either, as who was given up would."""
+    connections: set[Any] = set()
+
+    def give_up() -> None:
+        for connection in list(connections):
+            _give_up(connection)
+
+    watch = ServerWatch(what, lambda: _connects(engine), give_up)
+    event.listen(engine, "do_connect", lambda *_: watch.require_answering())
+    event.listen(engine, "connect", lambda connection, _: connections.add(connection))
+    for end in ("close", "close_detached"):
+        event.listen(engine, end, lambda connection, *_: connections.discard(connection))
+    return watch
+
+
+def _connects(engine: Engine) -> bool:
+    arguments, options = engine.dialect.create_connect_args(engine.url)
+    options["connect_timeout"] = ANSWERED_WITHIN_S
+    try:
+        with engine.dialect.loaded_dbapi.connect(*arguments, **options):
+            return True
+    except Exception:  # whatever a driver has for it
+        return False
 
 
 def _give_up(connection: Any) -> None:

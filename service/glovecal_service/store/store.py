@@ -13,7 +13,7 @@ from glovecal_client.private_files import PRIVATE_FOLDER, make_private
 from glovecal_service.settings import Settings
 from glovecal_service.store.actor import NOBODY_ELSE, Actor
 from glovecal_service.store.audit import Audit
-from glovecal_service.store.blobs import Artifacts, FolderBlobs, ObjectBlobs, full_disk_named
+from glovecal_service.store.blobs import Artifacts, FolderBlobs, full_disk_named
 from glovecal_service.store.changes import Changes, changes_since
 from glovecal_service.store.damages import Damages
 from glovecal_service.store.data_folder_lock import LOCK, WHO
@@ -23,6 +23,7 @@ from glovecal_service.store.jobs import Jobs
 from glovecal_service.store.keys import Keys
 from glovecal_service.store.layouts import Layouts
 from glovecal_service.store.models import Models
+from glovecal_service.store.object_blobs import ObjectBlobs
 from glovecal_service.store.people import People
 from glovecal_service.store.recordings import Recordings
 from glovecal_service.store.samplings import Samplings

@@ -5,17 +5,16 @@ from __future__ import annotations
 
 import copy
 import json
-import re
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
 
-import httpx
 import pytest
 import zenoh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from lawful_answers import require_lawful
 from stored_service import StoredService, stored_service
 from wild_requests import (
     WILD_JSON,
@@ -36,27 +35,11 @@ from glovecal_service.settings import Settings
 
 DOCUMENT = create_app(Settings()).openapi()
 ENDLESS = ("/v1/jobs/{id}/events", "/v1/sampling/{id}/events")
-NOT_WORKING = {"GET /v1/health/ready": 503}
-"""Real time is another process, which these tests do without."""
 OPERATIONS = [each for each in operations(DOCUMENT) if each.path not in ENDLESS]
 WILD = settings(
     max_examples=8,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
-FOREIGN = re.compile(
-    r"Traceback|\w+Error\b|Exception|Errno|object has no|not supported between|codec can't|Expecting \w|"
-    r"Input should|Field required|should match|numpy|pydantic|sqlalchemy|psycopg|sqlite3\.|<class|"
-    r"0x[0-9a-f]{6}|NoneType|invalid literal|could not convert|unhashable|list index|truth value|"
-    r"operands|broadcast|recursion|unexpected keyword|positional argument|magic number|"
-    r"Expected '='|mismatched tag|not well-formed|Invalid control|parquet magic|Exceeds the limit"
-)
-"""Words of Python and of libraries, which are for the log."""
-REMEDY = re.compile(
-    r"\b(give|use|send|name|choose|ask|leave|needs?|needed|expected|must|at most|at least|there (is|are)|"
-    r"it has|they have|has no|have no|stop|start|record|train|import|makes?|remove|correct|save|try|free|"
-    r"is no|is a|is it|not found|does not answer|look|allowed|answers to|belongs|already|between|columns are|"
-    r"write|begin|says why|divide|only|first|cannot|nothing)\b"
-)
 
 
 @pytest.fixture(scope="module")
@@ -157,16 +140,3 @@ def test_strangers_who_answer_for_others_are_left_out(stored: StoredService) -> 
 def _uploaded(stored: StoredService, content: bytes) -> str:
     kind = {"Content-Type": "application/octet-stream"}
     return stored.http.post("/uploads", content=content, headers=kind).json()["sha256"]
-
-
-def require_lawful(operation: Operation, answer: httpx.Response) -> None:
-    if answer.status_code < 400:
-        return
-    problem = json.loads(answer.text, parse_constant=lambda word: pytest.fail(f"{word} in an answer"))
-    assert answer.status_code < 500 or answer.status_code == NOT_WORKING.get(str(operation)), problem
-    sentences = [problem["detail"], *(item["problem"] for item in problem.get("errors", []))]
-    for sentence in sentences:
-        assert len(sentence) > 20 or problem["type"].endswith("invalid-request"), problem
-        assert not FOREIGN.search(sentence), sentence
-        assert REMEDY.search(sentence), sentence
-    assert len(answer.content) < 20_000

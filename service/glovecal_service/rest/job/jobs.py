@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
 from collections.abc import AsyncIterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any
@@ -18,6 +16,7 @@ from glovecal_service.questions.catalogue import ANSWERED
 from glovecal_service.questions.model_work import model_title
 from glovecal_service.request_types import IDENTIFIER
 from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.event_stream import looks
 from glovecal_service.rest.http.list_part import ByTime
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.report_page import REPORT, ReportFormat, report_response
@@ -32,8 +31,6 @@ router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 LOOK_EVERY_S = 0.25
 MOST_UNFINISHED_JOBS = 100
-LONGEST_STREAM_S = 3600.0
-"""After this the stream ends without ``done``; listeners connect again with ``Last-Event-ID``."""
 
 
 @router.get("", response_model=list[JobRow], summary="Jobs, newest first", responses=problems())
@@ -91,16 +88,18 @@ async def job_events(
     last_event_id: Annotated[int, Header(ge=0, le=2**62, description="Only what came after it.")] = 0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Server-sent events: `progress` for each step from the first on, then `done` with the whole job."""
-    until = time.monotonic() + LONGEST_STREAM_S
-    while time.monotonic() < until:
-        finished = await asyncio.to_thread(_finished, store, job.id)
-        for step in await asyncio.to_thread(store.jobs.events, job.id, last_event_id):
-            last_event_id = step.id
+    told = last_event_id
+
+    def look() -> tuple[dict[str, Any] | None, list[JobEvent]]:
+        return _finished(store, job.id), store.jobs.events(job.id, told)
+
+    async for finished, steps in looks(look, LOOK_EVERY_S):
+        for step in steps:
+            told = step.id
             yield ServerSentEvent(event="progress", id=str(step.id), data=_step(step))
         if finished is not None:
             yield ServerSentEvent(event="done", data=finished)
             return
-        await asyncio.sleep(LOOK_EVERY_S)
 
 
 def _finished(store: Store, id: str) -> dict[str, Any] | None:

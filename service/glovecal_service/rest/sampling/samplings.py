@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 import time
 from collections.abc import AsyncIterator
@@ -38,6 +37,7 @@ from glovecal_service.request_types import (
     WearingName,
 )
 from glovecal_service.rest.http.dependencies import StoreNeeded
+from glovecal_service.rest.http.event_stream import looks
 from glovecal_service.rest.http.list_part import ByTime
 from glovecal_service.rest.http.problem import change_problems, problems
 from glovecal_service.rest.http.request_types import IdInPath, SubjectFilter
@@ -49,8 +49,6 @@ from glovecal_service.store.sampling_reuse import reuse_takes
 router = APIRouter(prefix="/sampling", tags=["sampling"])
 
 LOOK_EVERY_S = 0.1
-LONGEST_STREAM_S = 3600.0
-"""After this the stream ends; listeners connect again."""
 MOST_TRIES = 20
 LARGEST_SEED = 2**31 - 1
 Angles = Annotated[list[FiniteFloat], Field(max_length=20)]
@@ -219,9 +217,8 @@ async def sampling_events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Server-sent events: `say` for each new sentence (its number is the event's id), `state` with the whole
     sampling whenever it differs, `over` at the end."""
-    until, shown = time.monotonic() + LONGEST_STREAM_S, None
-    while time.monotonic() < until:
-        record = await asyncio.to_thread(store.samplings.get, sampling.id)
+    shown = None
+    async for record in looks(lambda: store.samplings.get(sampling.id), LOOK_EVERY_S):
         view = _view(record)
         if view.say_number > last_event_id:
             last_event_id = view.say_number
@@ -233,7 +230,6 @@ async def sampling_events(
         if not record.open:
             yield ServerSentEvent(event="over", data=view.model_dump(mode="json"))
             return
-        await asyncio.sleep(LOOK_EVERY_S)
 
 
 def _view(record: SamplingRecord) -> SamplingView:
