@@ -53,6 +53,8 @@ class Poses:
 
     sent: int = 0
     came: set[int] = field(default_factory=set)
+    skipped: int = 0
+    """Counted by the service: on a computer that does too much else it leaves frames out, to stay current."""
 
     @property
     def missing(self) -> list[int]:
@@ -110,9 +112,14 @@ class ServedSite:
                 found.append(f"{operation}: {answer.status_code} after {took:.1f} s")
         return found
 
-    def states(self) -> dict[str, int]:
-        """How everything that only reads is answered."""
-        reads = [each for each in in_order() if each.method == "GET" and str(each) != "GET /v1/health/ready"]
+    def failures(self) -> list[str]:
+        """In the log; but for streams that a listener left."""
+        lines = self.log.read_text().splitlines()
+        return [line for line in lines if "request failed" in line and "/events" not in line]
+
+    def states(self, asked: list[Operation]) -> dict[str, int]:
+        """How those of them that only read are answered."""
+        reads = [each for each in asked if each.method == "GET" and str(each) != "GET /v1/health/ready"]
         return {str(each): self.ask(each, self.kept)[0].status_code for each in reads}
 
 
@@ -173,6 +180,7 @@ def _counted_poses(session: zenoh.Session, settings: Settings) -> Iterator[Poses
         pose = decode_pose(sample.payload.to_bytes())
         if not pose.stale and len(pose.degrees):
             poses.came.add(pose.sequence)
+            poses.skipped = pose.skipped
 
     def send() -> None:
         due = time.monotonic()

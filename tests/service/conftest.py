@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from jobs_counting import CountingJob
 from postgres_server import PostgresServer, find_programs
+from s3_server import S3Server
 
 from glovecal_service.jobs.dispatcher import Dispatcher
 from glovecal_service.questions.catalogue import ANSWERED
@@ -54,6 +55,14 @@ def own_postgres(postgres: PostgresServer) -> Iterator[PostgresServer]:
     server = PostgresServer(postgres.programs)
     yield server
     server.remove()
+
+
+@pytest.fixture
+def s3_server(tmp_path: Path) -> Iterator[S3Server]:
+    """A running object store of this test alone."""
+    server = S3Server(tmp_path / "objects")
+    yield server
+    server.kill()
 
 
 @pytest.fixture

@@ -74,13 +74,20 @@ class PostgresServer:
             self.stop()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def new_database(self) -> str:
-        """SQLAlchemy URL of a new, empty database."""
+    def new_database(self, *, place: Path | None = None) -> str:
+        """SQLAlchemy URL of a new, empty database, whose tables lie in ``place``."""
         name = f"glovecal_{secrets.token_hex(6)}"
+        tablespace = "pg_default" if place is None else f"of_{name}"
         with psycopg.connect(
             f"host={self.folder} user=postgres dbname=postgres", autocommit=True
         ) as connection:
-            connection.execute(f"CREATE DATABASE {name} STRATEGY FILE_COPY".encode())
+            if place is not None:
+                folder = place / tablespace
+                folder.mkdir()
+                if self._user is not None:
+                    shutil.chown(folder, self._user, self._user)
+                connection.execute(f"CREATE TABLESPACE {tablespace} LOCATION '{folder}'".encode())
+            connection.execute(f"CREATE DATABASE {name} STRATEGY FILE_COPY TABLESPACE {tablespace}".encode())
         return f"postgresql+psycopg://postgres@/{name}?host={self.folder}"
 
     def _run(self, program: str, *arguments: str) -> None:

@@ -16,7 +16,6 @@ from realtime_support import eventually
 from s3_server import S3Server
 
 pytestmark = pytest.mark.needs_postgres
-MESSAGES = {"killed": 503, "hung": 503, "full": 507}
 FEW = (
     *("GET /v1/subjects", "GET /v1/takes/{id}/series", "GET /v1/models/{id}/export", "GET /v1/overview"),
     *("POST /v1/takes", "POST /v1/models/import", "POST /v1/models/{id}/activate", "GET /v1/health/ready"),
@@ -60,27 +59,29 @@ def filled(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def away(server: S3Server | PostgresServer, how: str) -> Iterator[None]:
+def away(server: S3Server | PostgresServer | Path, how: str) -> Iterator[None]:
+    """``server``: or its disk."""
+    if isinstance(server, Path):
+        with filled(server):
+            yield
+        return
     if isinstance(server, S3Server):
         match how:
             case "killed":
                 server.kill()
                 yield
                 server.start()
-            case "hung":
+            case _:
                 server.halt()
                 yield
                 server.go_on()
-            case _:
-                with filled(server.folder):
-                    yield
         return
     processes = processes_of(server)
     if how == "killed":
         os.kill(processes[-1], signal.SIGKILL)
         yield
         server.start_after_kill()
-    elif how == "hung":
+    else:
         for process in processes:
             os.kill(process, signal.SIGSTOP)
         yield
@@ -89,20 +90,22 @@ def away(server: S3Server | PostgresServer, how: str) -> Iterator[None]:
                 os.kill(process, signal.SIGCONT)
 
 
-def try_it(site: ServedSite, server: S3Server | PostgresServer, how: str, only: tuple[str, ...] = ()) -> None:
+def try_it(
+    site: ServedSite, server: S3Server | PostgresServer | Path, how: str, only: tuple[str, ...] = ()
+) -> None:
     asked = [each for each in in_order() if not only or str(each) in only]
-    before = site.states()
+    before = site.states(asked)
     with away(server, how):
         complaints = site.complaints(asked, site.doomed, 503, 507)
     eventually(lambda: site.http.get("/health/ready").is_success, "it is ready again")
     assert not complaints, "\n".join(complaints)
-    assert site.states() == before
+    assert site.states(asked) == before
     assert not (more := site.complaints(asked, site.kept)), "\n".join(more)
-    assert site.poses.missing == []
-    assert "Traceback" not in site.log.read_text()
+    assert len(missing := site.poses.missing) <= site.poses.skipped <= site.poses.sent / 100, missing
+    assert site.failures() == []
 
 
-@pytest.mark.slow  # a minute each
+@pytest.mark.slow  # half a minute each
 @pytest.mark.parametrize("how", ["killed", "hung", "full"])
 def test_every_route_while_the_object_store_is(
     how: str, postgres: PostgresServer, small: Path, tmp_path: Path
@@ -110,17 +113,30 @@ def test_every_route_while_the_object_store_is(
     objects = S3Server(small)
     try:
         with served_site(tmp_path, objects, postgres.new_database()) as site:
-            try_it(site, objects, how)
+            try_it(site, small if how == "full" else objects, how)
     finally:
         objects.kill()
 
 
-@pytest.mark.slow  # a minute each
-@pytest.mark.parametrize("how", ["killed", "hung"])
-def test_every_route_while_the_database_is(how: str, own_postgres: PostgresServer, tmp_path: Path) -> None:
-    objects = S3Server(tmp_path / "objects")
-    try:
-        with served_site(tmp_path, objects, own_postgres.new_database()) as site:
-            try_it(site, own_postgres, how)
-    finally:
-        objects.kill()
+@pytest.mark.slow  # half a minute each
+@pytest.mark.parametrize("how", ["killed", "hung", "full"])
+def test_every_route_while_the_database_is(
+    how: str,
+    own_postgres: PostgresServer,
+    s3_server: S3Server,
+    tmp_path: Path,
+    mount_small_disk: Callable[[Path, str], None],
+) -> None:
+    disk = own_postgres.folder / "small"  # where its user may go
+    disk.mkdir()
+    mount_small_disk(disk, "40m")
+    with served_site(tmp_path, s3_server, own_postgres.new_database(place=disk)) as site:
+        try_it(site, disk if how == "full" else own_postgres, how)
+
+
+def test_a_route_of_each_kind_while_a_store_hangs(
+    own_postgres: PostgresServer, s3_server: S3Server, tmp_path: Path
+) -> None:
+    with served_site(tmp_path, s3_server, own_postgres.new_database()) as site:
+        try_it(site, s3_server, "hung", FEW)
+        try_it(site, own_postgres, "hung", FEW)
