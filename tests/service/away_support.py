@@ -70,6 +70,7 @@ class ServedSite:
     """What is changed and removed while something is away."""
     kept: StoredService
     poses: Poses
+    objects: S3Server
     log: Path
 
     def ask(self, operation: Operation, of: StoredService) -> tuple[httpx.Response, float]:
@@ -160,7 +161,7 @@ def served_site(folder: Path, objects: S3Server, database: str) -> Iterator[Serv
                 os.environ.pop(name) if value is None else os.environ.update({name: value})
         session = stack.enter_context(open_client([endpoint], wait_s=60))
         poses = stack.enter_context(_counted_poses(session, settings))
-        yield ServedSite(http, doomed, kept, poses, log)
+        yield ServedSite(http, doomed, kept, poses, objects, log)
 
 
 def _is_up(process: subprocess.Popen[bytes], http: httpx.Client, log: Path) -> bool:

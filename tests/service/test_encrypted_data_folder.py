@@ -32,7 +32,9 @@ from glovecal_service.rest.http.upload_folder import UploadFolder
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.blobs import Artifacts, FolderBlobs
+from glovecal_service.store.database import Database
 from glovecal_service.store.encrypt_folder import encrypt_folder
+from glovecal_service.store.shared_files import SharedFiles
 
 pytest.importorskip("cv2")
 GLOVECAL = [sys.executable, "-m", "glovecal_service.cli.command"]
@@ -317,7 +319,8 @@ def test_an_encrypted_upload_is_read_by_path_and_does_not_lie_on_the_disk(
     monkeypatch.setenv(KEY_FILE, str(make_key_file(tmp_path / "disk.key").file))
     if not in_memory:
         monkeypatch.setattr(upload_folder, "memory_file", lambda: None)
-    uploads, content = UploadFolder(tmp_path / "uploads"), TABLE.encode()
+    here = SharedFiles(Database("sqlite://"), None, tmp_path)
+    uploads, content = UploadFolder(here), TABLE.encode()
     upload = anyio.run(uploads.receive, whole(content))
     assert upload.sha256 == hashlib.sha256(content).hexdigest()
     assert is_kept_encrypted(upload.path)

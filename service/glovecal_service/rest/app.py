@@ -81,7 +81,7 @@ from glovecal_service.rest.take import (
 from glovecal_service.settings import Settings
 from glovecal_service.store.erasure import finish_erasures
 from glovecal_service.store.errors import StoreError
-from glovecal_service.store.retention import sweep
+from glovecal_service.store.retention import send_files, sweep
 from glovecal_service.store.site.web_login import AllowedHosts
 from glovecal_service.store.store import Store
 
@@ -93,6 +93,7 @@ MULTIPART_BYTES = 10_000
 """What a browser's form puts around the file."""
 BODY_PATIENCE_S = 30.0
 FIRST_SWEEP_AFTER_S, SWEEP_EVERY_S = 60.0, 3600.0
+SEND_EVERY_S = 5.0
 ROUTERS = (
     asking,
     *(subjects, erasures, usual_hand),
@@ -154,7 +155,7 @@ def create_app(
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         pin_blas_to_one_thread()
         opened = store or await run_in_threadpool(Store.open, settings)
-        uploads_folder = UploadFolder(settings.uploads_folder)
+        uploads_folder = UploadFolder(opened.files)
         await run_in_threadpool(uploads_folder.sweep)
         await run_in_threadpool(sweep_temporary_folders)
         await run_in_threadpool(finish_erasures, opened, settings)
@@ -167,11 +168,13 @@ def create_app(
         dispatcher.start()
         sweeping = asyncio.create_task(_sweep_hourly(opened, settings))
         searching = asyncio.create_task(search_for_damage(opened))
+        sending = asyncio.create_task(_send_files(opened, settings, is_over=of_one_command))
         try:
             yield
         finally:
             sweeping.cancel()
             searching.cancel()
+            sending.cancel()
             await run_in_threadpool(app.state.parts.filming.close)
             await run_in_threadpool(app.state.parts.cameras.close)
             await run_in_threadpool(app.state.parts.streamed_glove.stop)
@@ -226,6 +229,13 @@ async def _sweep_hourly(store: Store, settings: Settings) -> None:
         with suppress(StoreError):  # another time
             await run_in_threadpool(finish_erasures, store, settings)
         await asyncio.sleep(SWEEP_EVERY_S)
+
+
+async def _send_files(store: Store, settings: Settings, *, is_over: bool) -> None:
+    """``is_over``: soon, so it is left to the service."""
+    while store.files.are_shared and not is_over:
+        await run_in_threadpool(send_files, store, settings)
+        await asyncio.sleep(SEND_EVERY_S)
 
 
 def _guard(

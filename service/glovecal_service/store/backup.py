@@ -121,6 +121,8 @@ def restore_backup(source: Path, settings: Settings) -> Backup:
             for artifact in settings.artifacts_folder.iterdir():
                 store.artifacts.put_kept(artifact.name, artifact.read_bytes())
             shutil.rmtree(settings.artifacts_folder)
+        with store.database.write() as connection:
+            connection.execute(delete(tables.shared_files))  # all lie here now, and are sent from here
         rows, named, problems = _look_through(store)
     return Backup(
         datetime.fromisoformat(manifest["written_at"]), rows, len(named),
@@ -149,6 +151,8 @@ def _write(store: Store, settings: Settings, file: IO[bytes], folder: Path) -> N
                 written.append(_add_file(archive, FILES + path.relative_to(settings.data).as_posix(), path))
             except FileNotFoundError:  # retention, or an upload that is over
                 continue
+        for name, path in store.files.only_elsewhere():
+            written.append(_add_file(archive, FILES + name, path))
         manifest = {"format": FORMAT, "written_at": written_at.isoformat(), "files": written}
         content = json.dumps(manifest).encode()
         _add(archive, MANIFEST, len(content), io.BytesIO(content))

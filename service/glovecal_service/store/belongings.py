@@ -12,8 +12,7 @@ from typing import Any
 from glovecal_client.encryption.kept_file import open_kept
 from glovecal_client.errors import ClientError
 from glovecal_client.pictures.video_file import read_about, read_times
-from glovecal_models.errors import BadInput
-from glovecal_service.settings import Settings
+from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_service.store.errors import DamagedRows, NotFound
 from glovecal_service.store.records import (
     Activation,
@@ -95,35 +94,46 @@ def artifacts_of(artifact: str, facts: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys([artifact, *earlier[::-1]]))
 
 
-def recording_files(settings: Settings, id: str) -> list[Path]:
-    """What the recorder wrote of a recording: frames as they came, with its pre-roll."""
-    return sorted(settings.recordings_folder.glob(f"{id}.*"))
+def recording_files(store: Store, id: str) -> list[str]:
+    """What the recorder wrote of a recording, frames as they came with its pre-roll: paths below the data
+    folder."""
+    return store.files.names(f"recordings/{id}.")
 
 
-def films_of(settings: Settings, takes: list[TakeRecord]) -> list[Path]:
+def films_of(store: Store, takes: list[TakeRecord]) -> list[str]:
     """Films that were made while one of ``takes`` was recorded, with their tables of times: by the clock of
-    the computer that filmed, as the takes' videos have it."""
-    videos = Videos(settings.videos_folder)
+    the computer that filmed, as the takes' videos have it. Paths below the data folder."""
+    videos = Videos(store.files)
     spans = []
     for take in takes:
         try:
             spans.append(videos.facts(take.id))
-        except (NotFound, BadInput):
+        except (NotFound, BadInput, DamagedArtifact):
             continue
+    if not spans:
+        return []
+    films: dict[str, list[str]] = {}
+    for file in store.files.names("films/"):
+        films.setdefault(file.partition(".")[0], []).append(file)
     return [
         file
-        for film in sorted(settings.films_folder.glob("*.mkv"))
-        if any(_shows(film, span) for span in spans)
-        for file in sorted(settings.films_folder.glob(f"{film.stem}.*"))
+        for film, parts in films.items()
+        if any(_shows(store, film, span) for span in spans)
+        for file in parts
     ]
 
 
-def _shows(film: Path, video: VideoFacts) -> bool:
+def _shows(store: Store, film: str, video: VideoFacts) -> bool:
+    """``film``: without its ending. Of one that lies elsewhere its times are fetched, not its pictures."""
+    times, about = (store.files.find(f"{film}{end}") for end in (".times.csv", ".json"))
+    if times is None or about is None:
+        return False
+    place = about.with_suffix(".mkv")
     try:
-        times_s = [at_ns / 1e9 for at_ns, _ in read_times(film)]
+        times_s = [at_ns / 1e9 for at_ns, _ in read_times(place)]
     except ClientError:
         return False
-    if not times_s or read_about(film).get("computer") != video.computer:
+    if not times_s or read_about(place).get("computer") != video.computer:
         return False
     return times_s[0] <= video.times_s[-1] and video.times_s[0] <= times_s[-1]
 

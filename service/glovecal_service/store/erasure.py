@@ -29,7 +29,6 @@ from glovecal_service.store.belongings import (
     Belongings,
     artifacts_of,
     films_of,
-    parts_of,
     recording_files,
 )
 from glovecal_service.store.changes import tell_forgotten_subject
@@ -41,6 +40,7 @@ from glovecal_service.store.row_hash import change_rows
 from glovecal_service.store.store import Store
 from glovecal_service.store.subject_audit import SubjectAudit, names_subject
 from glovecal_service.store.subjects import require_subject
+from glovecal_service.store.take_file import video_of
 from glovecal_service.store.texts import json_text
 
 ERASED = "erased"
@@ -87,7 +87,7 @@ def erase(store: Store, settings: Settings, name: str) -> ErasureRecord:
     audit = SubjectAudit(store.audit, name, of.ids)
     jobs = of.jobs + [job for job in _jobs(store) if job.subject != name and _mentions(job, name, audit.ids)]
     _require_idle(of, jobs)
-    files = _files(of, audit, settings)
+    files = _files(store, of, audit, settings)
     hashed = [{**file, "sha256": _sha256(store, settings, file)} for file in files]
     id = new_id()
     rewriting = _Rewriting(store.audit, audit, f"{ERASED}-{id}")
@@ -97,6 +97,7 @@ def erase(store: Store, settings: Settings, name: str) -> ErasureRecord:
         rewriting.write(connection)
         tell_forgotten_subject(connection, name)
         connection.execute(insert(tables.erasures).values(id=id, files=files, began_at=now()))
+        store.files.note_gone(connection, _also_elsewhere(of, files) - _used(connection))
         counted = {**removed, "files": len(files)}
         proof = {"removed": counted, "sha256": sorted(file["sha256"] for file in hashed if file["sha256"])}
         tell_instead(
@@ -279,23 +280,31 @@ def _mentions(job: JobRecord, name: str, ids: set[str]) -> bool:
     return any(id in text for id in ids)
 
 
-def _files(of: Belongings, audit: SubjectAudit, settings: Settings) -> list[dict[str, str]]:
+def _files(store: Store, of: Belongings, audit: SubjectAudit, settings: Settings) -> list[dict[str, str]]:
     """Of the subject, also those whose rows were removed before."""
     artifacts = {
         artifact for take in of.takes for artifact in artifacts_of(take.artifact, take.facts)
     } | audit.artifacts
     artifacts |= {model.id for model in of.models}
-    paths = [path for id in audit.ids for path in recording_files(settings, id)]
-    paths += [settings.videos_folder / f"{id}.zip" for id in audit.ids]
-    paths += [settings.uploads_folder / take.original_sha256 for take in of.takes if take.original_sha256]
-    paths += films_of(settings, of.takes)
+    own = {file for id in audit.ids for file in recording_files(store, id)}
+    own |= {file for id in audit.ids for file in store.files.names(video_of(id))}
+    originals = (take.original_sha256 for take in of.takes if take.original_sha256)
+    own |= {file for sha256 in originals for file in store.files.names(f"uploads/{sha256}")}
+    own |= {*films_of(store, of.takes)}
     hidden = settings.data / "hidden-effects" / of.subject.name
-    paths += [path for path in hidden.rglob("*") if path.is_file()]
-    own = sorted({path.relative_to(settings.data).as_posix() for path in paths if path.is_file()})
+    own |= {path.relative_to(settings.data).as_posix() for path in hidden.rglob("*") if path.is_file()}
     return [
         *({"place": ARTIFACTS, "name": sha256} for sha256 in sorted(artifacts)),
-        *({"place": DATA, "name": path} for path in own),
+        *({"place": DATA, "name": path} for path in sorted(own)),
     ]
+
+
+def _also_elsewhere(of: Belongings, files: list[dict[str, str]]) -> set[str]:
+    """With those that other services may have and did not send yet."""
+    names = {file["name"] for file in files if file["place"] == DATA}
+    names |= {video_of(take.id) for take in of.takes}
+    names |= {f"uploads/{take.original_sha256}" for take in of.takes if take.original_sha256}
+    return names | {f"recordings/{recording.id}.glog" for recording in of.recordings}
 
 
 def _used(connection: Connection) -> set[str]:
@@ -315,13 +324,10 @@ def _sha256(store: Store, settings: Settings, file: dict[str, str]) -> str:
     """ "" for what is not there."""
     if file["place"] == ARTIFACTS:
         return file["name"] if store.artifacts.exists(file["name"]) else ""
-    digest, place = hashlib.sha256(), settings.data / file["name"]
     try:
-        for part in parts_of(place):
-            digest.update(part)
+        return store.files.sha256(file["name"])
     except DamagedFile:  # goes all the same: as it lies there
-        digest = hashlib.sha256(place.read_bytes())
-    return digest.hexdigest()
+        return hashlib.sha256((settings.data / file["name"]).read_bytes()).hexdigest()
 
 
 def _unlink(store: Store, settings: Settings, file: dict[str, str]) -> bool:
@@ -330,7 +336,7 @@ def _unlink(store: Store, settings: Settings, file: dict[str, str]) -> bool:
         if file["place"] == ARTIFACTS:
             store.artifacts.remove(file["name"])
         else:
-            (settings.data / file["name"]).unlink(missing_ok=True)
+            store.files.remove(file["name"])
     except (OSError, GlovecalError):
         _log.warning("a file of an erased subject cannot be removed now: it is tried again within an hour")
         return False

@@ -5,21 +5,23 @@ from __future__ import annotations
 
 import asyncio
 import os
+import secrets
 import threading
 from collections.abc import Awaitable, Callable, Hashable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 import obstore
 import obstore.store
 
-from glovecal_client.private_files import PRIVATE_FOLDER
+from glovecal_client.operating_system import move_over
+from glovecal_client.private_files import PRIVATE_FOLDER, open_private
 from glovecal_models.errors import BadInput
-from glovecal_service.store.blobs import full_disk_named, write_durably
-from glovecal_service.store.errors import StorageFull, StoreUnavailable
+from glovecal_service.store.blobs import TEMPORARY, full_disk_named, write_durably
+from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailable
 from glovecal_service.store.server_watch import LOOK_EVERY_S, ServerWatch
 
 Request = Callable[[], Awaitable[Any]]
@@ -78,22 +80,58 @@ class ObjectBlobs:
         return content
 
     def _keep(self, name: str, content: bytes) -> None:
-        """In the cache, whose oldest files make room; a full disk does without."""
+        """In the cache; a full disk does without."""
         with suppress(OSError, StorageFull):
             file = self._cache / name
             if file.exists() and file.stat().st_size == len(content):
                 os.utime(file)
                 return
             write_durably(file, content)
-            files = sorted(
-                (each.stat().st_mtime, each.stat().st_size, each) for each in self._cache.iterdir()
-            )
-            excess = sum(size for _, size, _ in files) - CACHE_BYTES
-            for _, size, old in files:
-                if excess <= 0:
-                    return
-                old.unlink(missing_ok=True)
-                excess -= size
+            self._make_room()
+
+    def _make_room(self) -> None:
+        """The oldest files make it."""
+        files = sorted(
+            (about.st_mtime, about.st_size, each)
+            for each in self._cache.rglob("*")
+            if each.is_file() and (about := each.stat())
+        )
+        excess = sum(size for _, size, _ in files) - CACHE_BYTES
+        for _, size, old in files[:-1]:
+            if excess <= 0:
+                return
+            old.unlink(missing_ok=True)
+            excess -= size
+
+    def send_file(self, name: str, file: Path) -> None:
+        """As it lies there. Raises OSError, StorageFull, StoreUnavailable."""
+        self._answered(lambda: obstore.put_async(self._store, name, file), writes=True)
+
+    def cached_file(self, name: str) -> Path:
+        """Where ``fetch_file`` puts it, whether or not it is there now."""
+        return self._cache / name
+
+    def fetch_file(self, name: str, check: Callable[[Path], None]) -> Path:
+        """A copy in the cache, once ``check`` of it raised nothing. Raises NotFound, OSError, StorageFull,
+        StoreUnavailable."""
+        target = self.cached_file(name)
+        unfinished = target.with_name(f"{TEMPORARY}{secrets.token_hex(8)}")
+        with full_disk_named(self._cache):
+            target.parent.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
+            try:
+                with open(unfinished, "xb", opener=open_private) as file:
+                    self._answered(lambda: _receive(self._store, name, file))
+                check(unfinished)
+                move_over(unfinished, target)
+            except _NOT_FOUND as error:
+                raise NotFound(
+                    f"{name} is missing from {self._url}; restore that file from a backup"
+                ) from error
+            finally:
+                unfinished.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._make_room()
+        return target
 
     def exists(self, name: str) -> bool:
         return self.stamp(name) is not None
@@ -171,6 +209,11 @@ class _Requests:
 
 async def _content(store: obstore.store.ObjectStore, name: str) -> bytes:
     return bytes(await (await obstore.get_async(store, name)).bytes_async())
+
+
+async def _receive(store: obstore.store.ObjectStore, name: str, file: BinaryIO) -> None:
+    async for part in (await obstore.get_async(store, name)).stream(min_chunk_size=1 << 20):
+        file.write(part)
 
 
 def _is_away(problem: BaseException | None) -> bool:

@@ -6,7 +6,8 @@ a copy in ``videos``), the ledgers of recordings that became takes, and the step
 recording that failed has its frames nowhere else, and stays. A job goes with its result
 ``GLOVECAL_KEEP_JOBS_DAYS`` after it was over, where a later one of its kind and subject was done.
 
-Ledgers that are not written to any more are packed meanwhile, to about a seventh.
+Ledgers that are not written to any more are packed meanwhile, to about a seventh. Where there is an object
+store, files that nobody writes to any more are sent there.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 
-from glovecal_client.encryption.kept_file import is_packed, pack_log
+from glovecal_client.encryption.kept_file import UNFINISHED, is_packed, pack_log
 from glovecal_client.errors import ClientError
 from glovecal_models.presentation.document import counted
 from glovecal_service.plain import reason_of
 from glovecal_service.settings import Settings
+from glovecal_service.store.blobs import SHA256_NAME
 from glovecal_service.store.database import now
 from glovecal_service.store.encrypt_folder import LOGS
 from glovecal_service.store.errors import NotFound, StoreDamaged, StoreError
@@ -65,16 +67,16 @@ def sweep(store: Store, settings: Settings) -> Swept:
     try:
         steps = store.jobs.forget_steps(now() - timedelta(days=settings.keep_days))
         jobs = store.jobs.forget(now() - timedelta(days=settings.keep_jobs_days))
+        store.files.forget_gone(now() - timedelta(days=settings.keep_days))
         candidates = [
-            *_uploads(store, settings, before), *_films(settings, before), *_ledgers(store, settings, before)
+            *_uploads(store, before), *store.files.older("films", before), *_ledgers(store, before)
         ]  # fmt: skip
     except StoreError:  # what came from an upload is not known now: another time
         return Swept()
     for file in candidates:
-        with suppress(OSError):
-            about = file.stat()
-            file.unlink()
-            count, size = count + 1, size + about.st_size
+        with suppress(OSError, StoreError):
+            size += store.files.remove(file)
+            count += 1
     return Swept(count, size, steps, jobs, sum(_pack(store, file) for file in _left_alone(settings)))
 
 
@@ -85,7 +87,12 @@ def _left_alone(settings: Settings) -> Iterator[Path]:
 def _pack(store: Store, file: Path) -> bool:
     """A ledger of a take; what cannot be packed stays as it is."""
     try:
-        return file.suffix in LOGS and not is_packed(file) and _became_a_take(store, file) and pack_log(file)
+        return (
+            file.suffix in LOGS
+            and not is_packed(file)
+            and _became_a_take(store, file.name)
+            and pack_log(file)
+        )
     except (OSError, ClientError) as error:
         log.warning("ledger %s is not packed: %s", file.name, reason_of(error))
         return False
@@ -99,9 +106,9 @@ def _old(folder: Path, before: float) -> Iterator[Path]:
                 yield file
 
 
-def _uploads(store: Store, settings: Settings, before: float) -> list[Path]:
+def _uploads(store: Store, before: float) -> list[str]:
     """Raises StoreError, also where a damaged row may have named one of them."""
-    old = [file for file in _old(settings.uploads_folder, before) if len(file.name) == 64]
+    old = [file for file in store.files.older("uploads", before) if SHA256_NAME.match(_name(file))]
     if not old:
         return []
     used, part = set(), ListPart(limit=TAKES_AT_ONCE)
@@ -111,21 +118,44 @@ def _uploads(store: Store, settings: Settings, before: float) -> list[Path]:
             raise StoreDamaged(page.damaged[0])
         used |= {take.original_sha256 for take in page.records}
         if page.after is None:
-            return [file for file in old if file.name not in used]
+            return [file for file in old if _name(file) not in used]
         part = ListPart(limit=TAKES_AT_ONCE, after=page.after)
 
 
-def _films(settings: Settings, before: float) -> Iterator[Path]:
-    return _old(settings.films_folder, before)
+def _ledgers(store: Store, before: float) -> Iterator[str]:
+    old = store.files.older("recordings", before)
+    return (file for file in old if _became_a_take(store, _name(file)))
 
 
-def _ledgers(store: Store, settings: Settings, before: float) -> Iterator[Path]:
-    return (file for file in _old(settings.recordings_folder, before) if _became_a_take(store, file))
+def _name(file: str) -> str:
+    return file.rpartition("/")[2]
 
 
-def _became_a_take(store: Store, ledger: Path) -> bool:
+def send_files(store: Store, settings: Settings) -> int:
+    """To the object store, what nobody here writes to any more and is not there yet; how many were sent. Of a
+    recording its ledger once it is packed."""
+    recordings = settings.recordings_folder
+
+    def is_whole(path: Path) -> bool:
+        if path.parent != recordings:
+            return True
+        is_log = path.suffix in LOGS
+        return (not is_log or is_packed(path)) and _became_a_take(store, path.name)
+
+    return store.files.send(_settled(settings), is_whole) if store.files.are_shared else 0
+
+
+def _settled(settings: Settings) -> Iterator[Path]:
+    yield from (path for path in settings.uploads_folder.glob("*") if SHA256_NAME.match(path.name))
+    yield from settings.videos_folder.glob("*.zip")
+    for about in settings.films_folder.glob("*.json"):  # written at its end
+        yield from settings.films_folder.glob(f"{about.stem}.*")
+    yield from (path for path in _left_alone(settings) if UNFINISHED not in path.name)
+
+
+def _became_a_take(store: Store, ledger: str) -> bool:
     """Raises StoreError where the store does not answer."""
     try:
-        return store.recordings.get(ledger.name.partition(".")[0]).state == BECAME_A_TAKE
+        return store.recordings.get(ledger.partition(".")[0]).state == BECAME_A_TAKE
     except (NotFound, StoreDamaged):
         return False

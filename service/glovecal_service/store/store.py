@@ -29,6 +29,7 @@ from glovecal_service.store.recordings import Recordings
 from glovecal_service.store.samplings import Samplings
 from glovecal_service.store.schema import upgrade
 from glovecal_service.store.sessions import Sessions
+from glovecal_service.store.shared_files import SharedFiles
 from glovecal_service.store.subjects import Subjects
 from glovecal_service.store.takes import Takes
 
@@ -36,9 +37,12 @@ from glovecal_service.store.takes import Takes
 class Store:
     """Safe to use from several threads; several processes may open the same one."""
 
-    def __init__(self, database: Database, artifacts: Artifacts, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, database: Database, artifacts: Artifacts, files: SharedFiles, clock: Callable[[], float]
+    ) -> None:
         self.database = database
         self.artifacts = artifacts
+        self.files = files
         self.actor = NOBODY_ELSE
         """Who asks."""
         self._clock = clock
@@ -71,11 +75,10 @@ class Store:
                 folder.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
         database = Database(settings.database_url)
         close_to_others(settings.data.resolve(), database.files)
-        blobs = (
-            ObjectBlobs(settings.artifacts, settings.data / "artifacts-cache")
-            if settings.artifacts
-            else FolderBlobs(settings.artifacts_folder)
+        objects = (
+            ObjectBlobs(settings.artifacts, settings.data / "artifacts-cache") if settings.artifacts else None
         )
+        artifacts = Artifacts(objects or FolderBlobs(settings.artifacts_folder))
         try:
             upgrade(database)
             for file in database.files:
@@ -83,7 +86,7 @@ class Store:
         except BaseException:
             database.close()
             raise
-        return cls(database, Artifacts(blobs), clock)
+        return cls(database, artifacts, SharedFiles(database, objects, settings.data), clock)
 
     def changes_since(self, seen: int | None) -> Changes:
         """As ``glovecal_service.store.changes`` has it."""
@@ -91,7 +94,8 @@ class Store:
 
     def acting_as(self, actor: Actor) -> Store:
         """The same store, asked by somebody: what they do not see is not there, and changes are theirs."""
-        bound = Store(self.database.acting_as(actor), self.artifacts, self._clock)
+        database = self.database.acting_as(actor)
+        bound = Store(database, self.artifacts, self.files.acting_as(database), self._clock)
         bound.actor = actor
         return bound
 

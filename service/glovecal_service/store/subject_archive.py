@@ -14,7 +14,6 @@ from typing import Any
 
 from glovecal_models.errors import DamagedArtifact
 from glovecal_service.plain import plain
-from glovecal_service.settings import Settings
 from glovecal_service.store.belongings import (
     Belongings,
     artifacts_of,
@@ -22,9 +21,10 @@ from glovecal_service.store.belongings import (
     parts_of,
     recording_files,
 )
-from glovecal_service.store.errors import DamagedRows, NotFound
+from glovecal_service.store.errors import DamagedRows, NotFound, StoreUnavailable
 from glovecal_service.store.store import Store
 from glovecal_service.store.subject_audit import SubjectAudit
+from glovecal_service.store.take_file import video_of
 
 README, MANIFEST = "README.txt", "manifest.json"
 AUDIT = "audit.jsonl"
@@ -63,9 +63,9 @@ Not here: frames in the logs of capture computers, and copies in backups.
 class SubjectArchive:
     """``parts()`` gives it; what is removed meanwhile is named in the manifest instead of being there."""
 
-    def __init__(self, store: Store, settings: Settings, name: str) -> None:
+    def __init__(self, store: Store, name: str) -> None:
         """Raises NotFound for a subject that is not there, or not for who asks."""
-        self._store, self._settings = store, settings
+        self._store = store
         self._of = Belongings.of(store, name)
         self._sink = _Sink()
         self._files: list[dict[str, Any]] = []
@@ -108,8 +108,8 @@ class SubjectArchive:
         yield from self._of_takes()
         for row in of.recordings:
             yield f"recordings/{row.id}/about.json", iter([_json(row)])
-            for path in recording_files(self._settings, row.id):
-                yield f"recordings/{row.id}/{path.name}", self._read(parts_of(path), path.name)
+            for file in recording_files(self._store, row.id):
+                yield f"recordings/{row.id}/{file.partition('/')[2]}", self._kept(file)
         for model in of.models:
             yield f"models/{model.id}/about.json", iter([_json(model)])
             yield f"models/{model.id}/model.safetensors", self._artifact(model.id)
@@ -126,23 +126,31 @@ class SubjectArchive:
             yield f"takes/{take.id}/about.json", iter([_json(take)])
             for number, artifact in enumerate(artifacts_of(take.artifact, take.facts), 1):
                 yield f"takes/{take.id}/take-{number}.safetensors", self._artifact(artifact)
-            video = self._settings.videos_folder / f"{take.id}.zip"
-            if video.is_file():
-                yield f"takes/{take.id}/video.zip", self._read(parts_of(video), video.name)
+            if self._store.files.names(video_of(take.id)):
+                yield f"takes/{take.id}/video.zip", self._kept(video_of(take.id))
         for sha256 in dict.fromkeys(take.original_sha256 for take in of.takes):
-            original = self._settings.uploads_folder / (sha256 or "")
-            if sha256 is not None and original.is_file():
-                yield f"originals/{sha256}", self._read(parts_of(original), sha256)
+            if sha256 is not None and self._store.files.names(f"uploads/{sha256}"):
+                yield f"originals/{sha256}", self._kept(f"uploads/{sha256}")
         if self._store.actor.subjects is None:  # films do not say whose they are
-            for film in films_of(self._settings, of.takes):
-                yield f"films/{film.name}", self._read(parts_of(film), film.name)
+            for film in films_of(self._store, of.takes):
+                yield film, self._kept(film)
 
     def _artifact(self, sha256: str) -> Iterator[bytes]:
         return self._read((self._store.artifacts.get(each) for each in [sha256]), sha256)
 
+    def _kept(self, file: str) -> Iterator[bytes]:
+        def parts() -> Iterator[bytes]:
+            path = self._store.files.find(file)
+            if path is not None:
+                yield from parts_of(path)
+
+        return self._read(parts(), file.partition("/")[2])
+
     def _read(self, parts: Iterator[bytes], name: str) -> Iterator[bytes]:
         try:
             yield from parts
+        except StoreUnavailable as error:
+            self._problems.append(f"{name} is not here: {error}")
         except (DamagedArtifact, NotFound, OSError):
             self._problems.append(f"{name} is missing or damaged: what is here of it is not whole")
 

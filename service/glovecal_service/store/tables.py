@@ -392,6 +392,18 @@ erasures = Table(
 )
 """Of subjects that are gone: files that are still to be removed, none once it is finished."""
 
+shared_files = Table(
+    "shared_files",
+    metadata,
+    Column("file", String(200), primary_key=True),
+    Column("sha256", SHA256),
+    Column("size_bytes", BigInteger, nullable=False),
+    Column("changed_at", UtcTime, nullable=False),
+    Column("row_sha256", SHA256, nullable=False),
+)
+"""Files of the data folder that lie in the object store as well, by their path: the hash of what they hold,
+NULL once they are gone, and their size as they lie there."""
+
 audit = Table(
     "audit",
     metadata,

@@ -22,6 +22,7 @@ from glovecal_models.documents import UNREADABLE_ARCHIVE, read_json
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.takes.take import Take
 from glovecal_service.store.errors import NotFound
+from glovecal_service.store.shared_files import SharedFiles
 
 VERSION = 1
 
@@ -120,25 +121,26 @@ class VideoFacts(BaseModel):
 
 
 class Videos:
-    """The folder ``videos`` of the data folder."""
+    """The folder ``videos`` of the data folder, and what other services have of it."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, files: SharedFiles) -> None:
+        self._files = files
 
     def attach(self, take: str, preview: Path) -> VideoFacts:
         """Keep ``preview`` for a take's id, in place of an earlier one. Raises BadInput."""
         facts = check_preview(preview)
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        partial = self._path(take).with_suffix(".partial")
+        path = self._files.data / video_of(take)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial")
         partial.unlink(missing_ok=True)
         with open_kept(preview) as file, create_whole(partial) as kept:
             shutil.copyfileobj(file, kept)
-        move_over(partial, self._path(take))
+        move_over(partial, path)
         return facts
 
     def takes(self) -> list[str]:
         """Ids of takes that have a video."""
-        return sorted(path.stem for path in self._folder.glob("*.zip"))
+        return [Path(file).stem for file in self._files.names("videos/") if file.endswith(".zip")]
 
     def facts(self, take: str) -> VideoFacts:
         """Raises NotFound, BadInput for a file that was damaged since."""
@@ -155,13 +157,15 @@ class Videos:
             raise BadInput(f"the video of take {take} is damaged; attach it again") from error
 
     def _found(self, take: str) -> Path:
-        path = self._path(take)
-        if not path.is_file():
+        path = self._files.find(video_of(take))
+        if path is None:
             raise NotFound(f"take {take} has no video; glovecal take video attaches one")
         return path
 
-    def _path(self, take: str) -> Path:
-        return self._folder / f"{take}.zip"
+
+def video_of(take: str) -> str:
+    """Its path below the data folder."""
+    return f"videos/{take}.zip"
 
 
 def check_preview(path: Path) -> VideoFacts:

@@ -97,7 +97,10 @@ def try_it(
     before = site.states(asked)
     with away(server, how):
         complaints = site.complaints(asked, site.doomed, 503, 507)
+        if server == site.objects.folder:
+            eventually(lambda: "not sent yet" in site.http.get("/health/ready").text, "what waits is told")
     eventually(lambda: site.http.get("/health/ready").is_success, "it is ready again")
+    eventually(lambda: "not sent yet" not in site.http.get("/health/ready").text, "nothing waits")
     assert not complaints, "\n".join(complaints)
     assert site.states(asked) == before
     assert not (more := site.complaints(asked, site.kept)), "\n".join(more)

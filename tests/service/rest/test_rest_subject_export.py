@@ -150,7 +150,7 @@ def test_a_recording_of_any_length_takes_no_more_memory(filled: Store, settings:
         file.truncate(300_000_000)
     tracemalloc.start()
     try:
-        size = sum(map(len, SubjectArchive(filled, settings, "anna").parts()))
+        size = sum(map(len, SubjectArchive(filled, "anna").parts()))
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

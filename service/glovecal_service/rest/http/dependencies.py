@@ -52,7 +52,7 @@ class Parts:
 
     @property
     def videos(self) -> Videos:
-        return Videos(self.settings.videos_folder)
+        return Videos(self.store.files)
 
 
 def _store(request: Request) -> Store:

@@ -94,7 +94,7 @@ def ready(parts: PartsNeeded, response: Response) -> Ready:
         **storage.model_dump(),
         realtime_seen_s_ago=seen_s_ago,
         realtime_restarts=restarts.within(TOLD_FOR_S),
-        problems=[*told, *_problems(parts.store)],
+        problems=[*told, *filter(None, [parts.store.files.waiting]), *_problems(parts.store)],
     )
 
 
@@ -153,7 +153,9 @@ def _check_artifacts(store: Store, data: Path) -> str:
     try:
         store.artifacts.exists("0" * 64)
     except (StoreError, OSError) as error:
-        raise Problem(503, "not-ready", f"the artifacts cannot be reached: {reason_of(error)}") from error
+        waiting = f"; {store.files.waiting}" if store.files.waiting else ""
+        told = f"the artifacts cannot be reached: {reason_of(error)}{waiting}"
+        raise Problem(503, "not-ready", told) from error
     if not os.access(data, os.W_OK):
         raise Problem(503, "not-ready", "the data folder cannot be written to")
     free = shutil.disk_usage(data).free

@@ -19,6 +19,7 @@ from glovecal_client.encryption.kept_file import create_whole, finish_file, is_k
 from glovecal_client.operating_system import move_over, name_for_a_file
 from glovecal_service.operating_system import memory_file, path_of
 from glovecal_service.store.blobs import full_disk_named, require_room
+from glovecal_service.store.shared_files import SharedFiles
 
 TEMPORARY = ".partial"
 WRITE_AT_ONCE = 2**20
@@ -38,10 +39,12 @@ class Upload:
 
 
 class UploadFolder:
-    """``uploads/`` in the data folder. Only complete files carry a sha256 name."""
+    """``uploads/`` in the data folder, and what other services have of it. Only complete files carry a sha256
+    name."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, files: SharedFiles) -> None:
+        self._files = files
+        self.folder = folder = files.data / "uploads"
         folder.mkdir(parents=True, exist_ok=True)
 
     def sweep(self) -> int:
@@ -71,9 +74,8 @@ class UploadFolder:
 
     def find(self, sha256: str) -> Path | None:
         """The upload of that name, or None; ``open_kept`` reads it. ``sha256`` must be 64 hex digits
-        already."""
-        path = self.folder / sha256
-        return path if path.is_file() else None
+        already. Raises as ``SharedFiles.find``."""
+        return self._files.find(f"uploads/{sha256}")
 
     @contextmanager
     def under_names(self, *files: tuple[str, Path]) -> Iterator[list[Path]]:

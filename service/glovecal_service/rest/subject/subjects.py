@@ -187,7 +187,7 @@ def get_robot(
 def export_subject(name: SubjectInPath, parts: PartsNeeded) -> StreamingResponse:
     """Takes, recordings as they came, videos, models, wearings, samplings, jobs, and changes that concern
     the subject. It is made while it is sent; one that breaks off has no manifest and is no zip file."""
-    archive = SubjectArchive(parts.store, parts.settings, name)
+    archive = SubjectArchive(parts.store, name)
     headers = {"Content-Disposition": f'attachment; filename="{name}.zip"', "Cache-Control": "no-store"}
     return StreamingResponse(archive.parts(), media_type=ZIP, headers=headers)
 
