@@ -254,9 +254,7 @@ def test_a_frame_of_18_sensors_takes_a_seventh_at_rest(
     sweep(both.here.store, both.here.settings)
     both.here.send()
     size = len(both.kept()[ledger]) / len(readings)
-    print(
-        f"{len(readings)} frames: {len(content) / len(readings):.1f} bytes each as they came, {size:.2f} kept"
-    )
+    print(f"{len(readings)} frames: {len(content) / len(readings):.1f} bytes each, {size:.2f} kept")
     assert size < 40
     assert both.there.read(ledger) == content
 

@@ -4,7 +4,9 @@ written last lies in a local folder as well."""
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
+import re
 import secrets
 import threading
 from collections.abc import Awaitable, Callable, Hashable
@@ -24,13 +26,14 @@ from glovecal_service.store.blobs import TEMPORARY, full_disk_named, write_durab
 from glovecal_service.store.errors import NotFound, StorageFull, StoreUnavailable
 from glovecal_service.store.server_watch import LOOK_EVERY_S, ServerWatch
 
+log = logging.getLogger("glovecal.store")
 Request = Callable[[], Awaitable[Any]]
 """Begins one; called in a loop."""
 WITHIN_S, KNOWN_WITHIN_S = 120, 1.5
 """For one request of a store that answers others meanwhile: large objects over slow lines; and for whether
 it has an object."""
 CACHE_BYTES = 2_000_000_000
-_NO_ROOM = ("507 Insufficient Storage", "QuotaExceeded", "StorageFull", "InsufficientStorage")
+_NO_ROOM = re.compile("507 Insufficient Storage|QuotaExceeded|StorageFull|InsufficientStorage")
 """In what an object store says that has no room."""
 _NOT_FOUND = (FileNotFoundError, obstore.exceptions.NotFoundError)
 _NOBODY = "0" * 64
@@ -160,10 +163,11 @@ class ObjectBlobs:
             except _NOT_FOUND:
                 raise
             except obstore.exceptions.BaseError as error:
+                log.info("object store %s: %s", self._url, error)
                 if _is_away(error):
                     self._watch.note_away()
                     self._watch.require_answering()
-                if any(word in str(error) for word in _NO_ROOM):
+                if re.search(_NO_ROOM, str(error)):
                     raise StorageFull(
                         f"no room left in the object store {self._url}; nothing was changed: free some there"
                     ) from error

@@ -154,8 +154,8 @@ def _check_artifacts(store: Store, data: Path) -> str:
         store.artifacts.exists("0" * 64)
     except (StoreError, OSError) as error:
         waiting = f"; {store.files.waiting}" if store.files.waiting else ""
-        told = f"the artifacts cannot be reached: {reason_of(error)}{waiting}"
-        raise Problem(503, "not-ready", told) from error
+        detail = f"the artifacts cannot be reached: {reason_of(error)}{waiting}"
+        raise Problem(503, "not-ready", detail) from error
     if not os.access(data, os.W_OK):
         raise Problem(503, "not-ready", "the data folder cannot be written to")
     free = shutil.disk_usage(data).free

@@ -88,14 +88,14 @@ async def job_events(
     last_event_id: Annotated[int, Header(ge=0, le=2**62, description="Only what came after it.")] = 0,
 ) -> AsyncIterator[ServerSentEvent]:
     """Server-sent events: `progress` for each step from the first on, then `done` with the whole job."""
-    told = last_event_id
+    last = last_event_id
 
     def look() -> tuple[dict[str, Any] | None, list[JobEvent]]:
-        return _finished(store, job.id), store.jobs.events(job.id, told)
+        return _finished(store, job.id), store.jobs.events(job.id, last)
 
     async for finished, steps in looks(look, LOOK_EVERY_S):
         for step in steps:
-            told = step.id
+            last = step.id
             yield ServerSentEvent(event="progress", id=str(step.id), data=_step(step))
         if finished is not None:
             yield ServerSentEvent(event="done", data=finished)
