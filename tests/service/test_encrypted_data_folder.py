@@ -319,7 +319,7 @@ def test_an_encrypted_upload_is_read_by_path_and_does_not_lie_on_the_disk(
     monkeypatch.setenv(KEY_FILE, str(make_key_file(tmp_path / "disk.key").file))
     if not in_memory:
         monkeypatch.setattr(upload_folder, "memory_file", lambda: None)
-    here = SharedFiles(Database("sqlite://"), None, tmp_path)
+    here = SharedFiles(Database(f"sqlite:///{tmp_path / 'none'}"), None, tmp_path)
     uploads, content = UploadFolder(here), TABLE.encode()
     upload = anyio.run(uploads.receive, whole(content))
     assert upload.sha256 == hashlib.sha256(content).hexdigest()

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from filled_store import META
 from s3_server import BUCKET, S3Server
+from sqlalchemy import text
 from stored_takes import LAYOUT, make_take
 
 from glovecal_client import Frame, FrameLog, encode_frame
@@ -28,6 +29,7 @@ from glovecal_service.store import Store, shared_files
 from glovecal_service.store.backup import make_backup, restore_backup
 from glovecal_service.store.erasure import erase
 from glovecal_service.store.errors import StoreUnavailable
+from glovecal_service.store.object_blobs import ObjectBlobs
 from glovecal_service.store.retention import send_files, sweep
 from glovecal_service.store.subject_archive import SubjectArchive
 from glovecal_service.store.take_file import Videos
@@ -152,7 +154,7 @@ def test_the_video_that_was_attached_last_is_shown_by_both(both: TwoServices, tm
     take.subjects.create("anna")
     take.layouts.put(LAYOUT)
     id = take.takes.add(make_take(1), subject="anna", layout=LAYOUT.name, source="import").id
-    both.here.put(f"videos/{id}.zip", preview(tmp_path, 2), ago_s=10)
+    both.here.put(f"videos/{id}.zip", preview(tmp_path, 2), ago_s=-HOUR_S)  # its clock is ahead
     assert both.here.send() == 1
     videos = [Videos(each.store.files) for each in (both.here, both.there)]
     assert [each.takes() for each in videos] == [[id], [id]]
@@ -281,14 +283,46 @@ def test_erased_at_one_service_it_is_gone_from_the_other_and_from_the_object_sto
     sweep(both.here.store, both.here.settings)
     both.here.send()
     assert both.there.read(anna.ledger) == anna.content
+    [take] = both.here.store.takes.list("anna")
+    assert both.there.store.takes.load(take.id).name == take.name
     assert erase(both.there.store, both.there.settings, "anna").is_finished
     assert both.kept() == {}
     both.here.send()
     for service in (both.here, both.there):
         left = [path for path in service.settings.data.rglob("*") if path.is_file() and path.suffix != ".id"]
-        hers = [path for path in left if any(path.as_posix().endswith(file) for file in anna.files)]
+        names = (*anna.files, take.artifact)
+        hers = [path for path in left if any(path.as_posix().endswith(name) for name in names)]
         assert hers == []
         assert [service.read(file) for file in anna.files] == [None] * len(anna.files)
+
+
+def test_erased_while_it_is_sent_it_does_not_come_back(
+    both: TwoServices, anna: Anna, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    send_file = ObjectBlobs.send_file
+
+    def send_and_erase(objects: ObjectBlobs, name: str, file: Path) -> None:
+        send_file(objects, name, file)
+        if "videos/" in name:
+            erase(both.there.store, both.there.settings, "anna")
+
+    monkeypatch.setattr(ObjectBlobs, "send_file", send_and_erase)
+    both.here.send()
+    both.here.send()
+    assert not [file for file in both.kept() if "videos" in file]
+
+
+def test_a_damaged_row_is_named_and_stops_no_other(both: TwoServices) -> None:
+    for file in (f"uploads/{NAME}", f"uploads/{'0' * 64}"):
+        both.here.put(file, TABLE)
+    both.here.send()
+    with both.here.store.database.write() as connection:
+        connection.execute(text("UPDATE shared_files SET size_bytes = 7 WHERE file LIKE '%0000'"))
+    assert both.there.store.files.names("uploads/") == [f"uploads/{NAME}"]
+    assert both.there.read(f"uploads/{NAME}") == TABLE
+    found = [damage.sentence for some in both.there.store.damages.search() for damage in some]
+    assert len(found) == 1
+    assert "shared_files was changed after it was written" in found[0]
 
 
 def test_erased_before_it_was_sent_it_is_not_sent_any_more(both: TwoServices, anna: Anna) -> None:

@@ -197,10 +197,16 @@ CATALOGUE = (
         "how long a restore takes",
     ),
     CatalogueFault(
-        17, "PostgreSQL restarted or killed",
-        "503, 0 acknowledged writes lost, writing within 5 s of its return",
-        (SERVICE + "test_store_postgres.py::test_nothing_acknowledged_is_lost_when_the_server_is_killed",),
-        "how soon, and poses meanwhile",
+        17, "PostgreSQL or the object store killed, hanging or full",
+        "503 or 507 within 5 s, 0 acknowledged writes lost, poses lose 0 frames, writing within 5 s of its "
+        "return",
+        (
+            SERVICE + "test_store_postgres.py::test_nothing_acknowledged_is_lost_when_the_server_is_killed",
+            SERVICE + "rest/test_rest_store_away.py::test_a_route_of_each_kind_while_a_store_hangs",
+            SERVICE + "rest/test_rest_store_away.py::test_every_route_while_the_object_store_is",
+            SERVICE + "rest/test_rest_store_away.py::test_every_route_while_the_database_is",
+        ),
+        "how soon it writes again",
     ),
     CatalogueFault(
         18, "worker killed, hanging, out of memory", "repeated; three crashes fail with a reason",

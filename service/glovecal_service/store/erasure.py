@@ -37,6 +37,7 @@ from glovecal_service.store.database import new_id, now
 from glovecal_service.store.errors import Conflict
 from glovecal_service.store.records import OPEN_RECORDING_STATES, JobRecord
 from glovecal_service.store.row_hash import change_rows
+from glovecal_service.store.shared_files import ARTIFACTS as GONE_ARTIFACTS
 from glovecal_service.store.store import Store
 from glovecal_service.store.subject_audit import SubjectAudit, names_subject
 from glovecal_service.store.subjects import require_subject
@@ -300,8 +301,9 @@ def _files(store: Store, of: Belongings, audit: SubjectAudit, settings: Settings
 
 
 def _also_elsewhere(of: Belongings, files: list[dict[str, str]]) -> set[str]:
-    """With those that other services may have and did not send yet."""
-    names = {file["name"] for file in files if file["place"] == DATA}
+    """With those that other services may have and did not send yet, and copies in their caches."""
+    places = {DATA: "", ARTIFACTS: GONE_ARTIFACTS}
+    names = {places[file["place"]] + file["name"] for file in files}
     names |= {video_of(take.id) for take in of.takes}
     names |= {f"uploads/{take.original_sha256}" for take in of.takes if take.original_sha256}
     return names | {f"recordings/{recording.id}.glog" for recording in of.recordings}

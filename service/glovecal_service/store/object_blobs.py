@@ -139,8 +139,12 @@ class ObjectBlobs:
     def exists(self, name: str) -> bool:
         return self.stamp(name) is not None
 
-    def remove(self, name: str) -> None:
+    def forget_copy(self, name: str) -> None:
+        """In the cache. Raises OSError."""
         (self._cache / name).unlink(missing_ok=True)
+
+    def remove(self, name: str) -> None:
+        self.forget_copy(name)
         with suppress(*_NOT_FOUND):
             self._answered(lambda: obstore.delete_async(self._store, name), writes=True)
 

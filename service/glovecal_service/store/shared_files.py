@@ -1,21 +1,23 @@
 """Files of the data folder that all services of a site have: once one is whole on the disk here, it is sent
 to the object store as it lies there, encrypted or not, and any other service reads it from there.
 
-A row of the database says which there are, and the hash of what each holds. One whose row has no hash is
-gone: each service removes its own copy. A file that was written here later than its row is the newer one.
+A row of the database says which there are, when each was written and the hash of what it holds. One whose
+row has no hash is gone: each service removes its own copy. A file that was written here later than its row
+says is the newer one.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
+import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from sqlalchemy import Connection, delete, select
@@ -28,11 +30,13 @@ from glovecal_service.store import tables
 from glovecal_service.store.database import Database, now
 from glovecal_service.store.errors import StoreError, StoreUnavailable
 from glovecal_service.store.object_blobs import ObjectBlobs
-from glovecal_service.store.row_hash import add_row, sound_row
+from glovecal_service.store.row_hash import add_row, sort_out, sound_row
 
 LOOK_AGAIN_AFTER_S = 600.0
 """At files that were sent: another service may have removed or replaced them."""
 log = logging.getLogger("glovecal.store")
+ARTIFACTS = "artifacts/"
+"""Begins the names of artifacts that are gone, among the files'."""
 _KEY = "files/"
 """Begins their names in the object store."""
 _LIKE = re.compile(r"([%_\\])")
@@ -56,6 +60,8 @@ class SharedFiles:
         self._database, self._objects, self.data = database, objects, data
         self._fetched_as: dict[str, str] = {}
         """Hashes of the copies in the cache."""
+        self._look_at = 0.0
+        """When rows are looked at though nothing is new here."""
         self._settled: dict[Path, tuple[tuple[int, int], float]] = {}
         self.waiting = ""
         """A sentence on what could not be sent at the last try."""
@@ -102,6 +108,15 @@ class SharedFiles:
             }
         return sorted(own)
 
+    def note_written(self, file: str) -> None:
+        """It was written here now: the newest, whatever the clocks of the services say."""
+        own = self.data / file
+        with suppress(StoreUnavailable):
+            row = self._row(file) if self.are_shared else None
+            if row is not None and not _is_newer(own, row):
+                later = (row.changed_at + timedelta(milliseconds=1)).timestamp()
+                os.utime(own, (later, later))
+
     def sha256(self, file: str) -> str:
         """Of what it holds, "" where there is none. Raises as ``find`` and ``open_kept``."""
         own = self.data / file
@@ -110,16 +125,16 @@ class SharedFiles:
         row = self._row(file) if self.are_shared else None
         return "" if row is None or row.sha256 is None else row.sha256
 
-    def older(self, folder: str, before: float) -> Iterator[str]:
-        """Of a folder: what was last written before that Unix time, as the service says that wrote it."""
-        for path in sorted((self.data / folder).glob("*")):
+    def older(self, folder: str, before: float) -> list[str]:
+        """Of a folder: what was last written before that Unix time, here or elsewhere. Raises StoreError."""
+        rows = self._rows(f"{folder}/") if self.are_shared else []
+        written = {row.file: row.changed_at.timestamp() for row in rows if row.sha256 is not None}
+        for path in (self.data / folder).glob("*"):
             with suppress(OSError):
-                if path.is_file() and path.stat().st_mtime < before:
-                    yield f"{folder}/{path.name}"
-        for row in self._rows(f"{folder}/") if self.are_shared else []:
-            is_old = row.changed_at.timestamp() < before
-            if is_old and row.sha256 is not None and not (self.data / row.file).is_file():
-                yield row.file
+                if path.is_file():
+                    file = f"{folder}/{path.name}"
+                    written[file] = max(path.stat().st_mtime, written.get(file, 0.0))
+        return sorted(file for file, at in written.items() if at < before)
 
     def remove(self, file: str) -> int:
         """Here, in the object store and, at their next look, at the other services; how many bytes went here.
@@ -161,14 +176,19 @@ class SharedFiles:
         """Send what of ``paths``, files of the data folder, is not there yet and ``is_whole``: nobody writes
         to it any more; remove what is gone. How many were sent; what cannot be sent now is told in
         ``waiting``."""
-        if self._objects is None:
-            return 0
         unsettled = [path for path in paths if not self._is_settled(path)]
+        if self._objects is None or not (unsettled or time.monotonic() > self._look_at):
+            return 0
         sent = waiting = 0
         try:
-            rows = {row.file: row for row in self._rows("")} if unsettled else {}
+            rows = {row.file: row for row in self._rows("")}
         except StoreError:
             return 0
+        for row in rows.values():
+            if row.sha256 is None:
+                self._objects.forget_copy(_KEY + row.file)
+                self._objects.forget_copy(row.file.removeprefix(ARTIFACTS))
+        self._look_at = time.monotonic() + LOOK_AGAIN_AFTER_S
         for path in unsettled:
             file = path.relative_to(self.data).as_posix()
             try:
@@ -213,8 +233,15 @@ class SharedFiles:
             about = path.stat()
             if (before.st_size, before.st_mtime_ns) != (about.st_size, about.st_mtime_ns):
                 return False  # was replaced meanwhile: the next time
+            written_at = datetime.fromtimestamp(about.st_mtime, UTC)
             with self._database.write() as connection:
-                _put(connection, SharedFile(file, digest, about.st_size, now()))
+                now_there = _select(connection, file)
+                if now_there is None or now_there == row or _is_newer(path, now_there):
+                    _put(connection, SharedFile(file, digest, about.st_size, written_at))
+                    now_there = None
+            if now_there is not None:  # was erased or replaced meanwhile: the next time
+                objects.remove(_KEY + file)
+                return False
         self._settled[path] = (before.st_size, before.st_mtime_ns), time.monotonic()
         return True
 
@@ -232,17 +259,23 @@ class SharedFiles:
         return cached
 
     def _row(self, file: str) -> SharedFile | None:
-        table = tables.shared_files
         with self._database.read() as connection:
-            row = connection.execute(select(table).where(table.c.file == file)).one_or_none()
-        return None if row is None else SharedFile(**sound_row(table, row))
+            return _select(connection, file)
 
     def _rows(self, begin: str) -> list[SharedFile]:
+        """But for damaged ones, which the search for damage names."""
         table = tables.shared_files
         like = table.c.file.like(_LIKE.sub(r"\\\1", begin) + "%", escape="\\")
         with self._database.read() as connection:
-            rows = connection.execute(select(table).where(like).order_by(table.c.file)).all()
-        return [SharedFile(**sound_row(table, row)) for row in rows]
+            rows = connection.execute(select(table).where(like).order_by(table.c.file))
+            return sort_out(table, rows, lambda values: SharedFile(**values))[0]
+
+
+def _select(connection: Connection, file: str) -> SharedFile | None:
+    """Raises StoreDamaged."""
+    table = tables.shared_files
+    row = connection.execute(select(table).where(table.c.file == file)).one_or_none()
+    return None if row is None else SharedFile(**sound_row(table, row))
 
 
 def _waiting_sentence(files: int, place: str) -> str:

@@ -136,6 +136,7 @@ class Videos:
         with open_kept(preview) as file, create_whole(partial) as kept:
             shutil.copyfileobj(file, kept)
         move_over(partial, path)
+        self._files.note_written(video_of(take))
         return facts
 
     def takes(self) -> list[str]:

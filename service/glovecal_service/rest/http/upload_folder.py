@@ -103,6 +103,7 @@ class UploadFolder:
         path = self.folder / digest
         is_new = not path.exists()
         move_over(temporary, path, durably=True)  # also over an earlier one: that may have been damaged since
+        self._files.note_written(f"uploads/{digest}")
         return Upload(path, digest, size, is_new)
 
 
