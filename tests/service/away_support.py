@@ -72,6 +72,7 @@ class ServedSite:
     poses: Poses
     objects: S3Server
     log: Path
+    slowest_s: float = 0.0
 
     def ask(self, operation: Operation, of: StoredService) -> tuple[httpx.Response, float]:
         """With right values of everything; the answer, or its first line, and how long it took."""
@@ -109,6 +110,7 @@ class ServedSite:
             except (AssertionError, httpx.HTTPError) as error:
                 found.append(f"{operation}: {error!r:.300}")
                 continue
+            self.slowest_s = max(self.slowest_s, took)
             if took > WITHIN_S:
                 found.append(f"{operation}: {answer.status_code} after {took:.1f} s")
         return found

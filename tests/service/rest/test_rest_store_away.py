@@ -104,6 +104,8 @@ def try_it(
     assert not complaints, "\n".join(complaints)
     assert site.states(asked) == before
     assert not (more := site.complaints(asked, site.kept)), "\n".join(more)
+    print(f"{how}: the slowest answer of {len(asked)} after {site.slowest_s:.1f} s,", end=" ")
+    print(f"{len(site.poses.missing)} of {site.poses.sent} frames without a pose")
     assert len(missing := site.poses.missing) <= site.poses.skipped <= site.poses.sent / 100, missing
     assert site.failures() == []
 
