@@ -13,7 +13,10 @@ import pytest
 from away_support import ServedSite, in_order, processes_of, served_site
 from postgres_server import PostgresServer, find_programs
 from realtime_support import eventually
-from s3_server import S3Server
+from s3_server import BUCKET, S3Server
+
+from glovecal_client.rest import Refused, RestClient
+from glovecal_service.settings import Settings
 
 pytestmark = pytest.mark.needs_postgres
 FEW = (
@@ -145,3 +148,27 @@ def test_a_route_of_each_kind_while_a_store_hangs(
     with served_site(tmp_path, s3_server, own_postgres.new_database()) as site:
         try_it(site, s3_server, "hung", FEW)
         try_it(site, own_postgres, "hung", FEW)
+
+
+def test_a_table_that_was_sent_to_one_service_is_imported_at_the_other(
+    serve: Callable[..., str], s3_server: S3Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in s3_server.environment.items():
+        monkeypatch.setenv(name, value)
+    shared = {"database": f"sqlite:///{tmp_path / 'one.sqlite3'}", "artifacts": f"s3://{BUCKET}/site"}
+    here, there = (Settings.model_validate({"data": tmp_path / name, **shared}) for name in ("a", "b"))
+    with RestClient(serve(here)) as first, RestClient(serve(there)) as second:
+        first.post("/subjects", {"name": "anna"})
+        table = "".join(f"{frame / 60},t,{frame % 90},{frame % 90 * 0.5}\n" for frame in range(300))
+        content = f"time_s,take,s.I_MCP,r.I_MCP\n{table}".encode()
+        (tmp_path / "t.csv").write_bytes(content)
+        sha256 = first.upload(tmp_path / "t.csv")
+        wanted = {"upload": sha256, "filename": "t.csv", "subject": "anna"}
+
+        def imported() -> bool:
+            with suppress(Refused):
+                return bool(second.post("/takes/import", wanted))
+            return False
+
+        eventually(imported, "the other service has the file")
+        assert [take["name"] for take in first.get("/takes")] == ["t"]

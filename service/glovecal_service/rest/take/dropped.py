@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated
@@ -47,7 +48,7 @@ def upload_kind(sha256: UploadInPath, parts: PartsNeeded) -> UploadKind:
 async def card_table(sha256: UploadInPath, parts: PartsNeeded) -> CardTable:
     """The recording of a CyberGlove III becomes a take table among the uploads; import it with its layout.
     422 for a file without a record."""
-    source = kept_upload(parts, sha256)
+    source = await asyncio.to_thread(kept_upload, parts, sha256)
     with temporary_folder() as folder:
         target = Path(folder, "card.csv")
         with parts.uploads.under_names((source.name, source)) as [card]:

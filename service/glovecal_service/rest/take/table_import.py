@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -92,7 +93,8 @@ async def add_takes(
     upload = await keep_table(request, parts)
     files = [(file_name(filename, options.format), upload.path)]
     if options.reference_upload is not None:
-        files.append((file_name(reference_filename, None), kept_upload(parts, options.reference_upload)))
+        reference = await asyncio.to_thread(kept_upload, parts, options.reference_upload)
+        files.append((file_name(reference_filename, None), reference))
     return await _imported(parts, response, files, upload.sha256, options)
 
 
@@ -119,9 +121,9 @@ class ImportedUpload(ImportedAs, UploadedTable):
 async def preview(body: UploadedTable, parts: PartsNeeded) -> TablePreview:
     """Nothing is imported. A table of a shape that was imported before is read as it was then; 422 for what
     is no table of numbers."""
-    path = kept_upload(parts, body.upload)
 
     def look() -> TablePreview:
+        path = kept_upload(parts, body.upload)
         references = [read_uploaded(parts, each).rows for each in body.references]
         with parts.uploads.under_names((body.filename, path)) as [named]:
             return preview_table(
@@ -142,7 +144,7 @@ async def preview(body: UploadedTable, parts: PartsNeeded) -> TablePreview:
 )
 async def import_upload(body: ImportedUpload, response: Response, parts: PartsNeeded) -> dict[str, Any]:
     """As `POST /v1/takes` does with a take table. How it was read is kept for the next file of its shape."""
-    files = [(body.filename, kept_upload(parts, body.upload))]
+    files = [(body.filename, await asyncio.to_thread(kept_upload, parts, body.upload))]
     return await _imported(parts, response, files, body.upload, body, body.mapping, body.references)
 
 
