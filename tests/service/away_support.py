@@ -16,7 +16,6 @@ from typing import Any
 import httpx
 import zenoh
 from lawful_answers import REMEDY, sentences_of
-from postgres_server import PostgresServer
 from realtime_support import WireGlove, eventually, free_endpoint, store_model
 from s3_server import BUCKET, S3Server
 from stored_service import StoredService, fill
@@ -203,11 +202,3 @@ def _counted_poses(session: zenoh.Session, settings: Settings) -> Iterator[Poses
         stop.set()
         sending.join()
         hearing.undeclare()
-
-
-def processes_of(server: PostgresServer) -> list[int]:
-    """The postmaster last."""
-    import psutil
-
-    postmaster = psutil.Process(int((server.folder / "data" / "postmaster.pid").read_text().split()[0]))
-    return [*(each.pid for each in postmaster.children(recursive=True)), postmaster.pid]

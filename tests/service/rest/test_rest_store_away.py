@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from away_support import ServedSite, in_order, processes_of, served_site
-from postgres_server import PostgresServer, find_programs
+from away_support import ServedSite, in_order, served_site
+from postgres_server import PostgresServer
 from realtime_support import eventually
 from s3_server import BUCKET, S3Server
 
@@ -25,16 +25,6 @@ FEW = (
     *("POST /v1/models/{id}/predict", "GET /v1/jobs/{id}/events", "PUT /v1/takes/{id}/note"),
 )
 """A route of each kind: of rows, of artifacts, of both, written and read."""
-
-
-@pytest.fixture
-def own_postgres(postgres: PostgresServer) -> Iterator[PostgresServer]:
-    """A server of this test alone."""
-    programs = find_programs()
-    assert programs is not None
-    server = PostgresServer(programs)
-    yield server
-    server.remove()
 
 
 @pytest.fixture
@@ -79,18 +69,13 @@ def away(server: S3Server | PostgresServer | Path, how: str) -> Iterator[None]:
                 yield
                 server.go_on()
         return
-    processes = processes_of(server)
     if how == "killed":
-        os.kill(processes[-1], signal.SIGKILL)
+        os.kill(int((server.folder / "data" / "postmaster.pid").read_text().split()[0]), signal.SIGKILL)
         yield
         server.start_after_kill()
     else:
-        for process in processes:
-            os.kill(process, signal.SIGSTOP)
-        yield
-        for process in processes[::-1]:
-            with suppress(ProcessLookupError):
-                os.kill(process, signal.SIGCONT)
+        with server.hanging():
+            yield
 
 
 def try_it(
