@@ -82,11 +82,15 @@ class Trained(Answer):
     held_out_how: str = ""
     wearing_sentences: Sequence[str] = ()
     """On the error in a wearing not seen."""
+    people: int = 0
+    """How many other people's takes were its prior."""
+    alone_rmse_deg: float | None = None
+    """Held out, had there been no prior of people; null: none was asked for, or nothing could be trained."""
 
     def presentation(self) -> Presentation:
         from glovecal_models.calibration.training_settings import OF_SHAPES
 
-        facts = [Fact("", sentence) for sentence in (self._sentence(), *self.wearing_sentences)]
+        facts = [Fact("", sentence) for sentence in self._sentences()]
         if self.method not in OF_SHAPES:
             facts.append(Fact("Next", f"glovecal diagnose {self.model[:SHORT]}", is_command=True))
         known = {name: error for name, error in self.per_rotation.items() if error is not None}
@@ -103,6 +107,14 @@ class Trained(Answer):
                 Section("What it was trained on", [Lines(self.sentences)], is_detail=True),
             ],
         )
+
+    def _sentences(self) -> list[str]:
+        said = [self._sentence(), *self.wearing_sentences]
+        if self.people:
+            alone = self.alone_rmse_deg
+            without = "too few own takes to tell" if alone is None else f"{alone:.2f} degrees"
+            said.insert(1, f"Its prior is the takes of {self.people} other people; error without: {without}.")
+        return said
 
     def _sentence(self) -> str:
         error, how = self.held_out_rmse_deg, self.held_out_how

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
+from glovecal_models.calibration.people_prior import plane_of_people, takes_by_wearing
 from glovecal_models.calibration.sample_weight import Recorded, fit_linear_with_variance, fit_weighted
 from glovecal_models.calibration.template import fit_on_plane, plane_for
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
@@ -50,6 +51,8 @@ class FitTask:
     """Degrees a count of the second of two inputs, where an equation of a template gives it."""
     variance: np.ndarray | None = None
     """Stated variance of each sample's reference, degrees squared; None: all alike."""
+    wearings: tuple[str, ...] = ()
+    """Of each take by its index, where other people's takes are a prior."""
     key: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -96,6 +99,10 @@ def _fit(task: FitTask, cancelled: Cancel | None, report: Report | None) -> Regr
         return rescale_readings(task.inputs, task.target, span, sensor_names=task.sensors)
     if task.known_gain is not None:
         return fit_beside(task.inputs, task.target, task.known_gain, sensor_names=task.sensors)
+    people = plane_of_people(settings.people, task.rotation, task.sensors)
+    if people is not None:
+        own = takes_by_wearing(task.inputs, task.target, task.take, task.wearings)
+        return people.regressor(own, settings.people_wearing or None)
     if settings.method in LINEAR_METHODS:
         return fit_linear_with_variance(
             task.inputs, task.target, task.variance, sensor_names=task.sensors, cancelled=cancelled
@@ -144,6 +151,8 @@ def _key(task: FitTask) -> str:
     }
     if task.without:
         facts["without"] = task.without
+    if task.wearings:
+        facts["wearings"] = task.wearings
     if task.known_gain is not None:
         facts["known_gain"] = task.known_gain
     digest.update(json.dumps(facts, sort_keys=True).encode())

@@ -348,6 +348,11 @@ def _tasks(
         if mask.any():
             fold, chosen, kept = settings.folds + number, left_out_settings(settings), kept_by(~mask)
             without.append(task_for(correspondence, kept, fold, chosen, palm=palm, without=groups[number]))
+    if settings.people:
+        known = [
+            [replace(task, wearings=tuple(wearings), key="") for task in part] for part in (tasks, without)
+        ]
+        return known[0], known[1]
     return tasks, without
 
 

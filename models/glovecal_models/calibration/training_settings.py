@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from glovecal_models.calibration.added_effect import EffectRequest
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.people_prior import PeoplePlane
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
 from glovecal_models.effects.base.effect import (
     Effect,
@@ -76,6 +77,12 @@ class TrainingSettings:
     prior: tuple[PriorPlane, ...] = ()
     """Planes that are the mean of LMC-GPR (``prior_mean``); no other method has one."""
 
+    people: tuple[PeoplePlane, ...] = ()
+    """What other people's takes say of the planes of method ``linear``; no other method has them."""
+
+    people_wearing: str = ""
+    """The wearing that such planes are for; empty: the takes' only one, else one more."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "kernels", tuple((str(name), str(kernel)) for name, kernel in self.kernels))
         if self.folds < 0 or self.folds == 1:
@@ -85,6 +92,10 @@ class TrainingSettings:
             )
         if self.prior and self.method != "lmc_gpr":
             raise BadInput(f"a prior mean is for method lmc_gpr, not for {self.method}")
+        if self.people and self.method != "linear":
+            raise BadInput(f"a prior of people is for method linear, not for {self.method}: --method linear")
+        stored = (PeoplePlane.from_document(item) if isinstance(item, dict) else item for item in self.people)
+        object.__setattr__(self, "people", tuple(stored))
 
 
 LEFT_OUT_SAMPLES = 500

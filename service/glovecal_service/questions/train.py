@@ -15,6 +15,7 @@ from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.order_confounding import order_confounding
+from glovecal_models.calibration.people_prior import PeoplePrior
 from glovecal_models.calibration.template import planes_of
 from glovecal_models.calibration.text import (
     order_sentences,
@@ -22,7 +23,7 @@ from glovecal_models.calibration.text import (
     wearing_sentences,
     weight_sentence,
 )
-from glovecal_models.calibration.training import assemble
+from glovecal_models.calibration.training import assemble, train
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
 from glovecal_models.calibration.training_settings import LINEAR_METHODS, Method, TrainingSettings
 from glovecal_models.comparison.odd_takes import odd_takes
@@ -34,15 +35,16 @@ from glovecal_models.regression.regressor import ProcessRegressor
 from glovecal_service.jobs.job_kind import JobPlan, Step, Task, TaskResult
 from glovecal_service.plain import document_of
 from glovecal_service.questions.making import Begun, Making, keep
+from glovecal_service.questions.people import prior_of_people
 from glovecal_service.questions.question import AsOption
 from glovecal_service.questions.training_takes import TrainingTakes, require_one_hand
 from glovecal_service.request_types import Id, Identifier, ModelReference, StrictBody, SubjectName
 from glovecal_service.store import Store
 from glovecal_service.store.errors import Conflict
-from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord
+from glovecal_service.store.records import JobRecord, ModelRecord, TakeRecord, hand_of
 
 MOST_TAKES = 1000
-_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels", "optima", "prior"}
+_SETTINGS = {field.name for field in fields(TrainingSettings)} - {"kernels", "optima", "prior", "people"}
 
 
 class TrainingRequest(StrictBody):
@@ -65,6 +67,12 @@ class TrainingRequest(StrictBody):
     parent: ModelReference | None = None
     prior: ModelReference | None = None
     """A linear model of the same glove, such as a template: lmc_gpr's mean where samples say nothing."""
+    people: Annotated[bool, AsOption(("--people",))] = False
+    """For method linear: other people's takes of the layout are a prior, so that half a minute is enough."""
+    people_prior: dict[str, Any] | None = None
+    """Such a prior from a file that was written by glovecal glove people."""
+    people_wearing: Annotated[str, AsOption(("--for-wearing",)), Field(max_length=200)] = ""
+    """With a prior of people and takes of several wearings: the one that is worn now. Default: the next."""
     samples: Annotated[int, Field(ge=10, le=5000)] = 2000
     """At most, for one rotation; fewer train faster."""
     folds: Annotated[int, Field(ge=0, le=20)] = 3
@@ -91,7 +99,26 @@ def begin(store: Store, body: TrainingRequest) -> Begun:
         payload["parent"] = store.models.get(body.parent).id
     if body.prior is not None:
         payload["prior"] = _prior(store, body, body.prior).id
+    if body.people or body.people_prior is not None:
+        payload["people_prior"] = _people(store, body, takes).to_document()
     return Begun(body.subject, payload)
+
+
+def _people(store: Store, body: TrainingRequest, takes: Sequence[TakeRecord]) -> PeoplePrior:
+    """From a file, else from the takes of others that whoever asks may see: means and variances, no takes."""
+    if body.method != "linear":
+        raise NotTrainable(f"a prior of people is for method linear, not for {body.method}: --method linear")
+    if body.people_wearing and body.people_wearing not in {take.wearing for take in takes}:
+        raise NotTrainable(f"no take is of wearing {body.people_wearing!r}; name a wearing of the takes")
+    layout = takes[0].layout
+    if body.people_prior is None:
+        return prior_of_people(store, layout, hand_of(takes), besides=body.subject)
+    prior = PeoplePrior.from_document(body.people_prior, "the prior of people")
+    if prior.layout != layout:
+        raise LayoutMismatch(
+            f"the prior of people is of layout {prior.layout!r}; the takes are of {layout!r}"
+        )
+    return prior
 
 
 def _prior(store: Store, body: TrainingRequest, id: str) -> ModelRecord:
@@ -141,6 +168,9 @@ def plan(store: Store, job: JobRecord) -> JobPlan:
     settings = TrainingSettings(**{name: getattr(asked, name) for name in _SETTINGS})
     if asked.prior is not None:
         settings = replace(settings, prior=planes_of(load(store.models.load_bytes(asked.prior))))
+    if asked.people_prior is not None:
+        people = PeoplePrior.from_document(asked.people_prior, "the prior of people")
+        settings = replace(settings, people=people.planes)
     parent = None if asked.parent is None else store.models.get(asked.parent).id
     records = _chosen_takes(store, asked)
     layout = records[0].layout
@@ -174,6 +204,8 @@ def plan(store: Store, job: JobRecord) -> JobPlan:
             method=model.method,
             held_out_how=str(model.error_estimate.get("how")),
             wearing_sentences=wearing_sentences(model, model.error_estimate.get("rmse_deg")),
+            people=max((plane.people for plane in settings.people), default=0),
+            alone_rmse_deg=_alone(taught, asked.subject) if settings.people else None,
         )
         document = document_of(found)
         facts = {name: document[name] for name in ("sentences", "confounded_order", "camera_ranges")}
@@ -186,6 +218,15 @@ def plan(store: Store, job: JobRecord) -> JobPlan:
         finish=finish,
         in_this_process=settings.method in LINEAR_METHODS,
     )
+
+
+def _alone(taught: TrainingTakes, subject: str) -> float | None:
+    """The held-out error without other people."""
+    settings = replace(taught.settings, people=(), people_wearing="")
+    try:
+        return train(taught.takes, taught.layout, subject, settings).error_estimate.get("rmse_deg")
+    except NotTrainable:
+        return None
 
 
 def fit(task: FitTask, cancelled: Callable[[], bool], report: Report) -> TaskResult:

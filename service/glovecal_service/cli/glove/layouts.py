@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,13 +15,16 @@ from glovecal_service.cli.terminal.connection import connect
 from glovecal_service.cli.terminal.options import AsJson, Glove, identifier, subject_named
 from glovecal_service.cli.terminal.printing import (
     REFUSED,
+    Overwrite,
     Refusal,
     exit_code_of,
     out,
     print_json,
     print_table,
     read_or_print,
+    require_place,
     sentence_of,
+    write_whole,
 )
 from glovecal_service.plain import read
 from glovecal_service.rest.glove.answer import Gloves, LatencyView, LayoutView
@@ -90,6 +94,22 @@ def add(
         name = add_layout_file(service, file)
         found = read(LayoutView, service.get(f"/gloves/{name}"))
     out.print(f"Added layout {name}: {len(found.sensors)} sensors, {len(found.rotations)} rotations.")
+
+
+@app.command("people")
+def people(
+    name: Layout,
+    file: Annotated[Path, typer.Argument(dir_okay=False, help="A .json file to write.")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write what the people of a layout have in common, as a prior for somebody new elsewhere.
+
+    Means and variances only: no reading, angle or name of a person. To use it: glovecal train --people-file.
+    """
+    require_place(file, overwrite=overwrite)
+    with connect() as service:
+        document = service.get(f"/gloves/{name}/people")
+    write_whole({file: (json.dumps(document, indent=1) + "\n").encode()})
 
 
 @app.command("wear")

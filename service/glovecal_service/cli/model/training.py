@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glovecal_models.calibration.people_prior import PeoplePrior
 from glovecal_models.hand.rotations import Handedness
 from glovecal_service.cli.asking import options_of
 from glovecal_service.cli.take.rows import find_takes, only_layout, stored_takes, takes_of
@@ -24,7 +26,17 @@ if TYPE_CHECKING:
 
 
 @options_of(
-    TrainingRequest, "method", "pseudo_inputs", "samples", "folds", "seed", "keep_dead", "prior", "activate"
+    TrainingRequest,
+    "method",
+    "pseudo_inputs",
+    "samples",
+    "folds",
+    "seed",
+    "keep_dead",
+    "prior",
+    "people",
+    "people_wearing",
+    "activate",
 )
 def train(
     subject: Subject,
@@ -38,6 +50,10 @@ def train(
     ] = None,
     leave_out: Annotated[list[str] | None, typer.Option(help="Take to keep for testing; repeat.")] = None,
     hand: OnlyHand = None,
+    people_file: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="A prior of people, by glovecal glove people."),
+    ] = None,
     wait: Annotated[bool, typer.Option(help="Wait for the model, else only start the job.")] = True,
     as_json: AsJson = False,
 ) -> None:
@@ -51,6 +67,8 @@ def train(
         raise typer.BadParameter(
             "--no-wait needs a service that goes on after this command: set GLOVECAL_URL"
         )
+    if people_file is not None:
+        asked["people_prior"] = PeoplePrior.load(people_file.read_bytes(), str(people_file)).to_document()
     with connect() as service:
         chosen, layout = _choose(service, subject, layout, hand, take or [], leave_out or [], asked["method"])
         job = service.post("/models/train", {**asked, "subject": subject, "layout": layout, "takes": chosen})

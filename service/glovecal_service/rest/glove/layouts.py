@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -13,6 +13,7 @@ from glovecal_client.keys import GloveKeys
 from glovecal_models.documents import read_toml
 from glovecal_models.errors import BadInput, BadLayout
 from glovecal_models.layout import MOST_NAMES, Layout
+from glovecal_service.questions.people import prior_of_people
 from glovecal_service.request_types import (
     ONE_LINE,
     Channel,
@@ -76,6 +77,17 @@ def get_layout(layout: NameInPath, store: StoreNeeded) -> LayoutView:
         if record.name == layout:
             return _view(record)
     raise no_layout(layout, (record.name for record in every))
+
+
+@router.get(
+    "/{layout}/people",
+    response_model=dict[str, Any],
+    summary="The people of a layout as a prior for somebody new",
+    responses=problems(),
+)
+def get_people(layout: NameInPath, store: StoreNeeded) -> dict[str, Any]:
+    """Means and variances of what their takes with a reference say; no reading, angle or name of anybody."""
+    return prior_of_people(store, layout).to_document()
 
 
 @router.put(
