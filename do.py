@@ -18,6 +18,8 @@
                             --quick, --minutes N; --page docs/study.md writes what was found);
                             study active: active sampling against the fixed protocol (half an hour);
                             study ablation: what every rule of the diagnosis is worth (hours; --minutes N);
+                            study new-person: error against seconds of own data, other people as prior
+                            (needs the shared recordings; a few minutes);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (quarter of an hour);
@@ -251,6 +253,8 @@ def paper(arguments: list[str]) -> int:
 def study(arguments: list[str]) -> int:
     if arguments[:1] == ["active"]:
         return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
+    if arguments[:1] == ["new-person"]:
+        return run("python", "tests/study/new_person.py", *arguments[1:])
     if arguments[:1] == ["ablation"]:
         return run("python", "tests/study/ablation.py", *arguments[1:])
     if arguments[:1] == ["demos"]:

@@ -11,6 +11,7 @@ held out.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,6 +35,7 @@ from glovecal_models.takes.take import Take
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 mpl.use("Agg")
+import matplotlib.pyplot as plt
 
 ANKLE = Path(__file__).resolve().parents[3] / "shared" / "data" / "ankle"
 PEOPLE = tuple(f"P{number}" for number in range(300, 305))
@@ -45,6 +47,7 @@ BLOCK = (0.5, 0.75)
 AMOUNTS = ("prior alone", "3 poses", "10 s", "30 s", "all")
 HOWS = ("without", "new person", "known person")
 """Known: the person's other placements are part of the prior."""
+NOT_ASKED = {("without", "prior alone"), ("known person", "all")}
 HALF_95 = 1.959964
 COLOURS = {"without": "#888888", "new person": "#1d6cab", "known person": "#d9822b"}
 
@@ -164,10 +167,7 @@ def asked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> tuple[Fo
                 for left in own:
                     rest = [item for item in own if item is not left]
                     for amount in AMOUNTS:
-                        if (how, amount) == ("known person", "all") or (how, amount) == (
-                            "without",
-                            "prior alone",
-                        ):
+                        if (how, amount) in NOT_ASKED:
                             continue
                         part = [*rest, *outside] if amount == "all" else amount_of(amount, rest)
                         found = errors_of(planes(given, part, count, wearing), left)
@@ -181,8 +181,8 @@ def asked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> tuple[Fo
 
 
 def checked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> Mapping[str, Sequence[Errors]]:
-    """What a quick check of the same three poses reaches: a linear model of the person's other placements with
-    ``donning_shift``, as docs/train.md has it."""
+    """A quick check by the same three poses: a linear model of the person's other placements with
+    ``donning_shift``."""
     layout, settings = layout_of(people), TrainingSettings(method="linear", folds=2)
     found: dict[str, list[Errors]] = {}
     for person in whom:
@@ -255,6 +255,27 @@ def draw(found: Found, file: Path) -> None:
     plt.close(figure)
 
 
+def page_of(
+    title: str, whom: Sequence[str], takes: Found, blocks: Found, check: Mapping[str, Sequence[Errors]]
+) -> str:
+    takes, blocks = (
+        {key: {person: own[person] for person in whom} for key, own in found.items()}
+        for found in (takes, blocks)
+    )
+    check = {person: check[person] for person in whom}
+    each = ", ".join(
+        f"{person} {rmse({person: takes['new person', '30 s'][person]}):.1f}"
+        f" ({rmse({person: takes['without', '30 s'][person]}):.1f} alone)"
+        for person in whom
+    )
+    return (
+        f"{title}, error on held-out takes in degrees, and how many of them the 95 % interval holds:\n\n"
+        f"{table(takes)}\n\nBy person, 30 s: {each}.\n\nA quick check of a known person by the same three "
+        f"poses: {rmse(check):.1f} ({100 * coverage(check):.0f} %).\n\nWithin the motions shown:\n\n"
+        f"{table(blocks, ['30 s'])}\n"
+    )
+
+
 def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="do.py study new-person", description=(__doc__ or "").partition("\n")[0]
@@ -271,24 +292,20 @@ def main(arguments: Sequence[str]) -> int:
     if options.smoke:
         print(table(asked(people, TUNED_ON[:1])[0]))
         return 0
-    parts = []
-    for title, whom in (
-        ("All five", PEOPLE),
-        ("Looked at while it was made", TUNED_ON),
-        ("Kept apart", PEOPLE[3:]),
-    ):
-        takes, blocks = asked(people, whom)
-        if whom == PEOPLE:
-            options.folder.mkdir(exist_ok=True)
-            draw(takes, options.picture or options.folder / "new-person.png")
-        check = checked(people, whom)
-        parts.append(
-            f"**{title}: {', '.join(whom)}.**\n\n{table(takes)}\n\nQuick check of a known person by the same "
-            f"three poses: {rmse(check):.1f} ({100 * coverage(check):.0f} %).\n\nWithin the motions:\n\n"
-            f"{table(blocks, ['30 s'])}\n"
+    takes, blocks = asked(people, PEOPLE)
+    check = checked(people, PEOPLE)
+    options.folder.mkdir(exist_ok=True)
+    draw(takes, options.picture or options.folder / "new-person.png")
+    text = "\n".join(
+        page_of(title, whom, takes, blocks, check)
+        for title, whom in (
+            ("All five", PEOPLE),
+            ("Looked at while it was made", TUNED_ON),
+            ("Kept apart", PEOPLE[len(TUNED_ON) :]),
         )
-        print(parts[-1], flush=True)
-    (options.folder / "new-person.md").write_text("\n".join(parts), encoding="utf-8")
+    )
+    print(text)
+    (options.folder / "new-person.md").write_text(text, encoding="utf-8")
     return 0
 
 

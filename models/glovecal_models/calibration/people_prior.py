@@ -40,7 +40,7 @@ LOG_SD = 0.75
 """Of the logarithm of a standard deviation about the expected one."""
 POPULATION_SHARE = 3.0
 """Of the rotation's standard deviation: how large a coefficient of the population could be."""
-LEVELS = ("person", "wearing", "take")
+LEVELS: tuple[str, ...] = ("person", "wearing", "take")
 
 
 class TakeSums(NamedTuple):
@@ -51,13 +51,13 @@ class TakeSums(NamedTuple):
     right: np.ndarray
     """(K,)."""
     target_square: float
-    count: float
+    samples: float
 
     def scaled(self, ratio: float) -> TakeSums:
         """Where every row counts ``ratio``, and all of them one at least: a held pose is one sample."""
-        ratio = max(ratio, 1.0 / max(self.count, 1.0))
+        ratio = max(ratio, 1.0 / max(self.samples, 1.0))
         return TakeSums(
-            ratio * self.square, ratio * self.right, ratio * self.target_square, ratio * self.count
+            ratio * self.square, ratio * self.right, ratio * self.target_square, ratio * self.samples
         )
 
 
@@ -107,7 +107,7 @@ class PeoplePlane:
         It is that of ``wearing``, if it is one of the takes', else of their only wearing, else of one more
         wearing. The claimed variance has what one more take may deviate by.
         """
-        if wearing in takes and len(takes) > 1:
+        if wearing is not None and wearing in takes and len(takes) > 1:
             earlier = {name: own for name, own in takes.items() if name != wearing}
             return self.of_person(earlier).regressor({wearing: takes[wearing]})
         person = {name: [self.sums(*take) for take in own] for name, own in takes.items()}
@@ -269,7 +269,7 @@ def takes_by_wearing(
     found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for number in np.unique(take):
         rows = take == number
-        found.setdefault(wearings[number], []).append((inputs[rows], target[rows]))
+        found.setdefault(wearings[int(number)], []).append((inputs[rows], target[rows]))
     return found
 
 
@@ -390,7 +390,7 @@ class _Tree:
 
     def _set(self, log_variance: np.ndarray) -> None:
         parts = np.exp(log_variance[:-1]).reshape(len(LEVELS), -1)
-        self.variance = dict(zip(LEVELS, parts, strict=True))
+        self.variance: dict[str, np.ndarray] = dict(zip(LEVELS, parts, strict=True))
         self.frame_variance = float(np.exp(log_variance[-1]))
 
     def learn(self) -> None:
@@ -420,7 +420,7 @@ class _Tree:
         """Negative logarithm of the posterior density, and its gradient."""
         self._set(log_variance)
         (mean, covariance), people = self._upward()
-        gradient = {level: np.zeros(self._size) for level in LEVELS}
+        gradient: dict[str, np.ndarray] = {level: np.zeros(self._size) for level in LEVELS}
         total, frame_gradient = 0.0, 0.0
 
         def down(level: str, own: Information, mean: np.ndarray, covariance: np.ndarray) -> Any:
@@ -445,9 +445,9 @@ class _Tree:
                     plane, uncertain = down("take", leaf, *of_wearing)
                     square = take.target_square - 2 * take.right @ plane
                     square += float(np.sum(take.square * (uncertain + np.outer(plane, plane))))
-                    frame_gradient += 0.5 * (take.count - square / self.frame_variance)
+                    frame_gradient += 0.5 * (take.samples - square / self.frame_variance)
                     total += 0.5 * (take.target_square / self.frame_variance)
-                    total += 0.5 * take.count * log_variance[-1]
+                    total += 0.5 * take.samples * log_variance[-1]
         seen = _total([_blurred(each, np.diag(self.variance["person"])) for each, _ in people])
         total -= 0.5 * float(seen.right @ covariance @ seen.right) + 0.5 * np.linalg.slogdet(covariance)[1]
         off = (log_variance - self._expected) / (2 * LOG_SD)

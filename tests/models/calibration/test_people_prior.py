@@ -148,7 +148,7 @@ def test_training_leans_on_people_and_what_is_held_out_is_not_seen_by_the_plane(
     expected = prior.planes[0].regressor(pairs(takes))
     np.testing.assert_allclose(own.regressor.mean(takes[0].readings), expected.mean(takes[0].readings))
     assert own.held_out_rmse_deg == pytest.approx(FRAME_DEG, abs=0.5)
-    assert load(dump(model)).rotations[0].regressor.evidence["people"] == 12
+    assert load(dump(model)).rotations[0].regressor.settings()["evidence"]["people"] == 12
     stored = json.loads(json.dumps(asdict(settings)))
     assert TrainingSettings(**stored).people == prior.planes
     with pytest.raises(BadInput, match="--method linear"):
