@@ -18,12 +18,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
+import new_person_hands
 import numpy as np
 
 from glovecal_models.calibration.people_prior import PeoplePrior, people_prior
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.errors import BadInput
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
 from glovecal_models.quick_check.held_poses import HeldPose
@@ -193,7 +195,11 @@ def checked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> Mappin
             model = add_effect(plain, elsewhere, "donning_shift", settings=settings, least_gain=-9).model
             for left in own:
                 poses = [pose_of(take) for take in own if take is not left]
-                predictor = GlovePredictor(quick_check(model, [p.take for p in poses], poses=poses).model)
+                try:
+                    after = quick_check(model, [pose.take for pose in poses], poses=poses).model
+                except BadInput:
+                    after = model  # poses that contradict the model are refused: it stays as it was
+                predictor = GlovePredictor(after)
                 angles = predictor.predict_take(left.time_s, left.readings, left.context, wearing)
                 reference = left.reference_at_frames(predictor.rotations)
                 known = np.isfinite(reference).all(axis=1)
@@ -248,7 +254,8 @@ def draw(found: Found, file: Path) -> None:
         errors = [rmse(found[how, AMOUNTS[place]]) for place in at]
         axes.plot(at, errors, "o-", color=COLOURS[how], label=labels[how])
     axes.set_xticks(range(len(AMOUNTS)), AMOUNTS)
-    axes.set(ylim=(0, None), ylabel="error on held-out takes, degrees", xlabel="own data of the wearing")
+    axes.set(ylim=(0, 30), ylabel="held-out error, degrees", xlabel="data of the person's own wearing")
+    axes.grid(axis="y", alpha=0.3)
     axes.legend(frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(file, dpi=110)
@@ -304,6 +311,8 @@ def main(arguments: Sequence[str]) -> int:
             ("Kept apart", PEOPLE[len(TUNED_ON) :]),
         )
     )
+    hands = new_person_hands.table(new_person_hands.asked())
+    text = f"{text}\nSimulated hands, in the second of two wearings:\n\n{hands}\n"
     print(text)
     (options.folder / "new-person.md").write_text(text, encoding="utf-8")
     return 0

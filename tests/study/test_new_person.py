@@ -1,12 +1,13 @@
-"""A new person of the ankle recordings, by the others: the errors that docs/train.md tells, with some room."""
+"""A new person of the ankle recordings, by the others: what docs/train.md tells, with some room."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import new_person_hands
 import numpy as np
 import pytest
-from new_person import ANKLE, AMOUNTS, PEOPLE, Errors, asked, coverage, draw, read_people, rmse, table
+from new_person import AMOUNTS, ANKLE, PEOPLE, Errors, asked, coverage, draw, read_people, rmse, table
 
 
 @pytest.mark.needs_shared_data
@@ -29,3 +30,11 @@ def test_the_table_tells_degrees_and_how_many_the_interval_holds(tmp_path: Path)
     assert "| 30 s |  | 3.5 (50 %) |  |" in table(found)
     draw(found, tmp_path / "errors.png")
     assert (tmp_path / "errors.png").stat().st_size > 5_000
+
+
+def test_simulated_hands_are_known_before_they_move_and_better_after_three_poses() -> None:
+    errors = new_person_hands.asked((600, 601, 602, 603))
+    degrees = {key: float(np.sqrt(np.mean([square for square, _ in own]))) for key, own in errors.items()}
+    assert degrees["3 poses", "new person"] < min(degrees["none", "new person"], degrees["3 poses", "alone"])
+    assert degrees["none", "known person"] < degrees["none", "new person"]
+    assert "| none |  | " in new_person_hands.table(errors)

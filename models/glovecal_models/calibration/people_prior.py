@@ -37,7 +37,8 @@ EXPECTED_SHARE = {"person": 0.5, "wearing": 0.25, "take": 0.12, "frame": 0.12}
 """Standard deviations expected before any take, as shares of the rotation's own: a coefficient is degrees
 over one standard deviation of its sensor."""
 LOG_SD = 0.75
-"""Of the logarithm of a standard deviation about the expected one."""
+"""Of the logarithm of a standard deviation about the expected one. From 0.35 to 1.5, and with other shares
+above, errors on three people's ankles change by a tenth at most."""
 POPULATION_SHARE = 3.0
 """Of the rotation's standard deviation: how large a coefficient of the population could be."""
 LEVELS: tuple[str, ...] = ("person", "wearing", "take")
@@ -236,7 +237,7 @@ def people_prior(takes: Mapping[str, Sequence[Take]], layout: Layout) -> PeopleP
     """Of the people whose ``takes`` these are, by person. Rotations measured in fewer than two people have
     no prior. Raises NotTrainable where there is no such rotation, LayoutMismatch."""
     planes = []
-    for item in layout.correspondences:
+    for item in (each for each in layout.correspondences if each.simulated is None):
         plane = _learned(takes, linear_correspondence(item))
         if plane is not None:
             planes.append(plane)
