@@ -90,13 +90,13 @@ Found = Mapping[tuple[str, str], Mapping[str, Sequence[Errors]]]
 
 def read_people(folder: Path = ANKLE, people: Sequence[str] = PEOPLE) -> dict[str, list[Take]]:
     """The takes of each person on one clock; a placement is a wearing."""
-    found = {}
+    takes_by_person = {}
     for person in people:
         takes = [take for path in sorted(folder.glob(f"{person}-*.frames.csv")) for take in read_takes(path)]
         offsets = clock_offsets(takes)
         takes = [aligned(take, item.offset_s) for take, item in zip(takes, offsets, strict=True)]
-        found[person] = [replace(take, wearing=take.name.rpartition("-")[0]) for take in takes]
-    return found
+        takes_by_person[person] = [replace(take, wearing=take.name.rpartition("-")[0]) for take in takes]
+    return takes_by_person
 
 
 def layout_of(people: Mapping[str, Sequence[Take]]) -> Layout:
@@ -134,21 +134,21 @@ def planes(
         readings = np.concatenate([take.readings for take in takes])
         angles = np.concatenate([take.angles for take in takes])
         return [fit_linear(readings, angles[:, at]) for at in range(rotations)]
-    found = []
+    regressors = []
     for at, plane in enumerate(prior.planes):
         own: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
         for take in takes:
             own.setdefault(take.wearing, []).append((take.readings, take.angles[:, at]))
-        found.append(plane.regressor(own, wearing))
-    return found
+        regressors.append(plane.regressor(own, wearing))
+    return regressors
 
 
 def errors_of(regressors: Sequence[LinearRegressor], take: Frames) -> Errors:
     degrees, inside = [], []
     for regressor, angle in zip(regressors, take.angles.T, strict=True):
-        found = regressor.predict(take.readings)
-        degrees.append(found.mean - angle)
-        inside.append(np.abs(degrees[-1]) < HALF_95 * np.sqrt(found.variance + regressor.noise_variance))
+        predicted = regressor.predict(take.readings)
+        degrees.append(predicted.mean - angle)
+        inside.append(np.abs(degrees[-1]) < HALF_95 * np.sqrt(predicted.variance + regressor.noise_variance))
     return Errors(np.array(degrees).T, np.array(inside).T)
 
 
@@ -172,13 +172,13 @@ def asked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> tuple[Fo
                         if (how, amount) in NOT_ASKED:
                             continue
                         part = [*rest, *outside] if amount == "all" else amount_of(amount, rest)
-                        found = errors_of(planes(given, part, count, wearing), left)
-                        takes.setdefault((how, amount), {}).setdefault(person, []).append(found)
+                        errors = errors_of(planes(given, part, count, wearing), left)
+                        takes.setdefault((how, amount), {}).setdefault(person, []).append(errors)
                 part = [item.some(~item.block) for item in own]
                 fitted = planes(given, part, count, wearing)
                 for item in own:
-                    found = errors_of(fitted, item.some(item.block))
-                    blocks.setdefault((how, "30 s"), {}).setdefault(person, []).append(found)
+                    errors = errors_of(fitted, item.some(item.block))
+                    blocks.setdefault((how, "30 s"), {}).setdefault(person, []).append(errors)
     return takes, blocks
 
 
@@ -186,7 +186,7 @@ def checked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> Mappin
     """A quick check by the same three poses: a linear model of the person's other placements with
     ``donning_shift``."""
     layout, settings = layout_of(people), TrainingSettings(method="linear", folds=2)
-    found: dict[str, list[Errors]] = {}
+    errors: dict[str, list[Errors]] = {}
     for person in whom:
         for wearing in dict.fromkeys(take.wearing for take in people[person]):
             own = [take for take in people[person] if take.wearing == wearing]
@@ -204,8 +204,10 @@ def checked(people: Mapping[str, Sequence[Take]], whom: Sequence[str]) -> Mappin
                 reference = left.reference_at_frames(predictor.rotations)
                 known = np.isfinite(reference).all(axis=1)
                 error = (angles.mean - reference)[known]
-                found.setdefault(person, []).append(Errors(error, np.abs(error) < HALF_95 * angles.sd[known]))
-    return found
+                errors.setdefault(person, []).append(
+                    Errors(error, np.abs(error) < HALF_95 * angles.sd[known])
+                )
+    return errors
 
 
 def pose_of(take: Take) -> HeldPose:
@@ -214,18 +216,18 @@ def pose_of(take: Take) -> HeldPose:
     return HeldPose(take, known[len(known) // 2 :][:POSE_FRAMES])
 
 
-def rmse(found: Mapping[str, Sequence[Errors]]) -> float:
+def rmse(errors: Mapping[str, Sequence[Errors]]) -> float:
     """Over people, each of whom counts alike, degrees."""
-    each = [np.mean(np.concatenate([item.degrees for item in own]) ** 2) for own in found.values()]
+    each = [np.mean(np.concatenate([item.degrees for item in own]) ** 2) for own in errors.values()]
     return float(np.sqrt(np.mean(each)))
 
 
-def coverage(found: Mapping[str, Sequence[Errors]]) -> float:
-    each = [np.mean(np.concatenate([item.inside for item in own])) for own in found.values()]
+def coverage(errors: Mapping[str, Sequence[Errors]]) -> float:
+    each = [np.mean(np.concatenate([item.inside for item in own])) for own in errors.values()]
     return float(np.mean(each))
 
 
-def table(found: Found, amounts: Sequence[str] = AMOUNTS) -> str:
+def table(errors: Found, amounts: Sequence[str] = AMOUNTS) -> str:
     """Degrees, and in percent how much of what is held out its 95 % intervals hold."""
     heads = {
         "without": "own data alone",
@@ -236,13 +238,13 @@ def table(found: Found, amounts: Sequence[str] = AMOUNTS) -> str:
     for amount in amounts:
         cells = []
         for how in HOWS:
-            own = found.get((how, amount))
+            own = errors.get((how, amount))
             cells.append("" if own is None else f"{rmse(own):.1f} ({100 * coverage(own):.0f} %)")
         lines.append(f"| {amount} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def draw(found: Found, file: Path) -> None:
+def draw(errors: Found, file: Path) -> None:
     figure, axes = plt.subplots(figsize=(6.4, 3.4), layout="constrained")
     labels = {
         "without": "own data alone",
@@ -250,9 +252,9 @@ def draw(found: Found, file: Path) -> None:
         "known person": "known person, next wearing",
     }
     for how in HOWS:
-        at = [place for place, amount in enumerate(AMOUNTS) if (how, amount) in found]
-        errors = [rmse(found[how, AMOUNTS[place]]) for place in at]
-        axes.plot(at, errors, "o-", color=COLOURS[how], label=labels[how])
+        at = [place for place, amount in enumerate(AMOUNTS) if (how, amount) in errors]
+        heights = [rmse(errors[how, AMOUNTS[place]]) for place in at]
+        axes.plot(at, heights, "o-", color=COLOURS[how], label=labels[how])
     axes.set_xticks(range(len(AMOUNTS)), AMOUNTS)
     axes.set(ylim=(0, 30), ylabel="held-out error, degrees", xlabel="data of the person's own wearing")
     axes.grid(axis="y", alpha=0.3)
@@ -266,8 +268,8 @@ def page_of(
     title: str, whom: Sequence[str], takes: Found, blocks: Found, check: Mapping[str, Sequence[Errors]]
 ) -> str:
     takes, blocks = (
-        {key: {person: own[person] for person in whom} for key, own in found.items()}
-        for found in (takes, blocks)
+        {key: {person: own[person] for person in whom} for key, own in errors.items()}
+        for errors in (takes, blocks)
     )
     check = {person: check[person] for person in whom}
     each = ", ".join(

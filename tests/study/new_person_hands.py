@@ -1,4 +1,4 @@
-"""Simulated hands beside the ankles of ``new_person.py``: each hand by the seven others, two wearings each."""
+"""Simulated hands beside the ankles of ``new_person.py``: each by the seven others, two wearings each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Errors = dict[tuple[str, str], list[tuple[float, float]]]
 
 def takes_of(hand: int) -> list[Take]:
     """Two of free motion in each wearing."""
-    found = []
+    takes = []
     for wearing in range(WEARINGS):
         glove = SimulatedGlove(hand, wearing=wearing)
         for number in range(2):
@@ -33,8 +33,8 @@ def takes_of(hand: int) -> list[Take]:
             take = simulate_take(
                 glove, segment, seed=100 * hand + 10 * wearing + number, rate_hz=RATE_HZ
             ).take
-            found.append(replace(take, wearing=f"wearing-{wearing}"))
-    return found
+            takes.append(replace(take, wearing=f"wearing-{wearing}"))
+    return takes
 
 
 def asked(hands: Sequence[int] = HANDS) -> Errors:
@@ -73,9 +73,9 @@ def _alone(given: Pairs, plane: PeoplePlane) -> LinearRegressor:
 
 
 def _error(regressor: LinearRegressor, inputs: np.ndarray, target: np.ndarray) -> tuple[float, float]:
-    found = regressor.predict(inputs)
-    error = found.mean - target
-    inside = np.abs(error) < HALF_95 * np.sqrt(found.variance + regressor.noise_variance)
+    predicted = regressor.predict(inputs)
+    error = predicted.mean - target
+    inside = np.abs(error) < HALF_95 * np.sqrt(predicted.variance + regressor.noise_variance)
     return float(np.mean(error**2)), float(inside.mean())
 
 

@@ -267,11 +267,11 @@ def takes_by_wearing(
     inputs: np.ndarray, target: np.ndarray, take: np.ndarray, wearings: Sequence[str]
 ) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
     """Samples of several takes, each of number ``take`` (N,), as ``PeoplePlane.regressor`` wants them."""
-    found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    by_wearing: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for number in np.unique(take):
         rows = take == number
-        found.setdefault(wearings[int(number)], []).append((inputs[rows], target[rows]))
-    return found
+        by_wearing.setdefault(wearings[int(number)], []).append((inputs[rows], target[rows]))
+    return by_wearing
 
 
 class Information(NamedTuple):
@@ -310,12 +310,12 @@ def _sums(basis: np.ndarray, target: np.ndarray) -> TakeSums:
 
 
 def _measured(takes: Sequence[Take], item: Correspondence) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
-    found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    by_wearing: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for take in takes:
         samples = gather_samples([take], item)
         if len(samples):
-            found.setdefault(take.wearing, []).append((samples.inputs, samples.target))
-    return found
+            by_wearing.setdefault(take.wearing, []).append((samples.inputs, samples.target))
+    return by_wearing
 
 
 def _learned(takes: Mapping[str, Sequence[Take]], item: Correspondence) -> PeoplePlane | None:
@@ -396,8 +396,8 @@ class _Tree:
 
     def learn(self) -> None:
         """The most probable variances."""
-        found = minimize(self._objective, self._expected, jac=True, method="L-BFGS-B")
-        self._set(found.x)
+        optimum = minimize(self._objective, self._expected, jac=True, method="L-BFGS-B")
+        self._set(optimum.x)
 
     def population(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (K,) and covariance (K, K) of the population's plane."""

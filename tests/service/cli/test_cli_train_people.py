@@ -19,19 +19,21 @@ def takes_of(person: int, wearings: int, seconds: float) -> list[Take]:
     """Two sensors about two joints, each take of another part of their range."""
     random = np.random.default_rng(person)
     gains, offset = np.array([0.5, 0.2]) + 0.03 * random.standard_normal(2), 5 * random.standard_normal()
-    found = []
+    takes = []
     for number in range(wearings):
         shift = 3 * random.standard_normal()
         for part in range(2):
             time_s = np.arange(0, seconds, 0.05)
             swing = np.sin(2 * np.pi * time_s[:, None] / 3 + np.array([0, 2.0 * part]))
-            readings = np.round(150 + 40 * part + np.array([60, 20]) * swing + random.normal(0, 0.5, swing.shape))
+            readings = np.round(
+                150 + 40 * part + np.array([60, 20]) * swing + random.normal(0, 0.5, swing.shape)
+            )
             angles = (readings - 150) @ gains + offset + shift + random.normal(0, 3, len(time_s))
             name = f"{part}-{number}"
-            found.append(
+            takes.append(
                 Take(name, f"day-{number}", SENSORS, time_s, readings, ("BEND",), time_s, angles[:, None])
             )
-    return found
+    return takes
 
 
 @pytest.fixture

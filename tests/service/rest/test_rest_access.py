@@ -41,6 +41,7 @@ TRAINERS = {
     *("POST /takes/examination", "POST /takes/examination/report"),
     *("POST /improve", "POST /jobs/{id}/cancel", "POST /subjects/{name}/detectability"),
     "GET /subjects/{name}/export",
+    "GET /gloves/{layout}/people",
 }
 ADMINS = {"DELETE /subjects/{name}", "GET /keys", "POST /keys", "DELETE /keys/{name}", "GET /audit",
           "GET /audit/check", "POST /erasures", "GET /people", "POST /people", "PUT /people/{name}",

@@ -48,7 +48,7 @@ _OF_SESSIONS = (
 RULES: tuple[tuple[str, str, Role], ...] = (
     (r".*", r"(keys|people|audit|erasures)(/.*)?", "admin"),
     (r"DELETE", r"subjects/.*", "admin"),
-    (r"GET|HEAD", r"subjects/[^/]+/export", "trainer"),
+    (r"GET|HEAD", r"subjects/[^/]+/export|gloves/[^/]+/people", "trainer"),
     (r"GET|HEAD|OPTIONS", r".*", "viewer"),
     (r"POST", _ASKED_BY_POST, "viewer"),
     (r"DELETE", r"takes/[^/]+", "trainer"),
