@@ -184,7 +184,10 @@ class NeverEmpty(ByHand):
 
 
 def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GlovePipeline]]:
-    """What a loop did that has 20 ms for a round, and frames of 5 ms each."""
+    """What a loop did that has 20 ms for a round, and frames of 5 ms each.
+
+    It is seen to go on meanwhile, though frames wait all the time.
+    """
     served = [
         replace(
             ServedModel.prepare(f"{number + 1:064x}", linear_model("anna", degrees_per_count=0.5)),
@@ -200,6 +203,7 @@ def overloaded(gloves: int, models: int) -> tuple[list[CostlyPace], list[GlovePi
         round_budget_s=0.020,
     )  # fmt: skip
     loop.step()
+    assert loop.turns > 24
     return [cast(CostlyPace, model.pace) for model in served], loop.lanes
 
 

@@ -93,7 +93,7 @@ class PoseLoop:
         self._collected_ns = clock_ns()
         self._failed: set[str] = set()
         self.turns = 0
-        """How often it looked for frames; others may read it."""
+        """How often it looked for frames or took a turn, which under load never ends; others may read it."""
 
     @property
     def lanes(self) -> list[GlovePipeline]:
@@ -127,6 +127,7 @@ class PoseLoop:
         self._pending.setdefault(self._models.of(lane.glove), {})[lane] = None
 
     def _take_turn(self) -> None:
+        self.turns += 1
         started = time.perf_counter()
         waiting = sum(map(len, self._pending.values()))
         model = next(iter(self._pending))
