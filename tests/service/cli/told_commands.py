@@ -28,8 +28,8 @@ SAMPLES = {
     "subject": "anna", "SUBJECT": "anna", "NAME": "anna", "name": "anna", "SOURCE": "camera:0",
     "glove": "right", "hand": "left", "GLOVE": "right", "LENGTH": "190", "seed": "1", "file": "FILE",
     "named": "--take 0123456789ab", "field": "0123456789ab", "effect": "hysteresis",
-    "table": "FILE", "layout": "cyberglove18", "LAYOUT": "cyberglove18", "TAKE": "0123456789ab", "DEVICE": "simulated",
-    "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "needed": "trainer",
+    "table": "FILE", "layout": "cyberglove18", "LAYOUT": "cyberglove18", "TAKE": "0123456789ab",
+    "DEVICE": "simulated", "seconds": "40", "LONG_ENOUGH_S": "60", "method": "lmc_gpr", "needed": "trainer",
     "device": "lucidglove:/dev/ttyUSB0", "kind": "worker",
 }  # fmt: skip
 
