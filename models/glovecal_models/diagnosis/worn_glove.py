@@ -66,6 +66,7 @@ def worn_glove_findings(
     return (
         *_rhythm(take, nominal_hz),
         *_sensors(take, moved),
+        *(GloveFinding("sensor", f"{each}.", each.remedy) for each in channel_faults(take)),
         *jumps,
         *((not jumps and _wearer(take, model)) or _place(take, low, high)),
     )
@@ -162,7 +163,7 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
                 "Run it again while you bend, spread and turn the whole hand.",
             ),
         )
-    dead = [
+    return [
         GloveFinding(
             "sensor",
             f"{dead.sensor} is {dead.why} while other sensors move.",
@@ -170,7 +171,6 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
         )
         for dead in dead_sensors([take], take.sensors)
     ]
-    return dead + [GloveFinding("sensor", f"{each}.", each.remedy) for each in channel_faults(take)]
 
 
 def _jumps(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:

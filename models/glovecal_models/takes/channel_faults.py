@@ -46,6 +46,7 @@ class ChannelFault:
 
 
 def channel_faults(take: Take) -> tuple[ChannelFault, ...]:
+    """In the order of the channels; frames must be in order of time."""
     time_s, readings, names = take.time_s, take.readings, take.sensors
     faults: list[ChannelFault] = []
     changes = np.diff(readings, axis=0, prepend=np.nan) != 0
@@ -65,12 +66,13 @@ def _flat_lines(time_s: np.ndarray, values: np.ndarray, others: np.ndarray, name
         return []
     length = end - start
     at_end = (values[start] == values.min()) | (values[start] == values.max())
-    moving = np.array([_others_move(others[first:after]) for first, after in zip(start, end, strict=True)])
     lasts = (length >= STUCK_FRAMES) & (time_s[end - 1] - time_s[start] >= STUCK_S) & ~at_end
-    cut = (length >= CLIPPED_FRAMES) & at_end
-    usual = max(int(length[~lasts & ~at_end].max(initial=1)), 1)
+    usual = int(length[~lasts & ~at_end].max(initial=1))
+    odd = (length >= TIMES_LONGER * usual) & (lasts | (at_end & (length >= CLIPPED_FRAMES)))
+    for run in np.flatnonzero(odd):
+        odd[run] = _others_move(others[start[run] : end[run]])
     faults = []
-    stuck = lasts & moving & (length >= TIMES_LONGER * usual)
+    stuck, clipped = odd & lasts, odd & at_end
     if stuck.any():
         first = int(np.flatnonzero(stuck)[0])
         begin, until, level = time_s[start[first]], time_s[end[first] - 1], values[start[first]]
@@ -83,7 +85,6 @@ def _flat_lines(time_s: np.ndarray, values: np.ndarray, others: np.ndarray, name
                 "Look at its wire and plug, and leave that part out or record it again.",
             )
         )  # fmt: skip
-    clipped = cut & moving & (length >= TIMES_LONGER * usual)
     share = float(length[clipped].sum()) / len(values)
     lasted_s = float((time_s[end[clipped] - 1] - time_s[start[clipped]]).sum())
     if share >= CLIPPED_SHARE and lasted_s >= CLIPPED_S:

@@ -158,7 +158,7 @@ def end_if_it_stands_still(loop: PoseLoop, stopped: Event) -> None:
         turns = loop.turns
         if in_vain >= LOOKS_IN_VAIN:
             _log.error(
-                "the loop of poses stands still since %.0f s: this process ends", in_vain * LOOKS_EVERY_S
+                "the loop of poses has stood still for %.0f s: this process ends", in_vain * LOOKS_EVERY_S
             )
             os._exit(1)
 
