@@ -331,9 +331,9 @@ def page(known: Constants, held: list[Checked]) -> str:
     load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
     costs = {
         "a turn of a model with 22 rotations of 100 nodes, hysteresis and lag": _us(known.even.turn_s),
-        "... and each frame in it": _us(known.even.frame_s),
+        "... and each frame in such a turn": _us(known.even.frame_s),
         f"a turn of a model as training made it ({known.nodes})": _us(known.trained.turn_s),
-        "... and each frame in it ": _us(known.trained.frame_s),
+        "... and each frame in that one": _us(known.trained.frame_s),
         "a frame of 18 sensors, on the wire": f"{known.frame_bytes} bytes",
         "a pose of 22 rotations, on the wire": f"{known.pose_bytes} bytes",
         "a frame in a capture log": f"{known.log_bytes} bytes",
@@ -380,9 +380,9 @@ def _needs(known: Constants) -> dict[str, str]:
     cores = f"{100 * SHARE:.1f} % predicted, p99 of the age {P99_MS:.0f} ms"
     return {
         f"real-time processes, a core each, models with 100 nodes ({cores})": f"{even}",
-        "gloves a core then": f"{SITE_GLOVES / even:.0f}",
+        "gloves a core with those": f"{SITE_GLOVES / even:.0f}",
         "real-time processes, models as training made them": f"{trained}",
-        "gloves a core then ": f"{SITE_GLOVES / trained:.0f}",
+        "gloves a core with these": f"{SITE_GLOVES / trained:.0f}",
         "network, frames in": f"{to_mbit * known.frame_bytes:.0f} Mbit/s and what zenoh adds",
         "network, poses to one who sees all": f"{to_mbit * known.pose_bytes:.0f} Mbit/s and what zenoh adds",
         "written while all record": f"{1e-6 * a_second * known.log_bytes:.0f} MB/s",

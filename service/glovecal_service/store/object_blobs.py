@@ -232,10 +232,8 @@ def _is_away(problem: BaseException | None) -> bool:
 def _opened(url: str, within_s: float) -> obstore.store.ObjectStore:
     """No request takes longer than that."""
     options = {"connect_timeout": "2s", "timeout": f"{within_s}s"}
-    if os.environ.get("AWS_ALLOW_HTTP", "").lower() in (
-        "true",
-        "1",
-    ):  # our options stand in for those named there
+    # our options stand in for those of the environment
+    if os.environ.get("AWS_ALLOW_HTTP", "").lower() in ("true", "1"):
         options["allow_http"] = "true"
     return obstore.store.from_url(
         url,
