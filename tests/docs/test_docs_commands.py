@@ -6,6 +6,8 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +17,6 @@ from glovecal_service.cli.command import command
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-OF_DO_PY = {"--smoke": "do.py", "--quick": "tests/paper/paper.py", "--part": "tests/paper/paper.py"}
-OF_DO_PY |= {"--set-aside": "tests/study/study.py", "--gloves": "tests/bench/streaming_bench.py"}
-OF_DO_PY |= dict.fromkeys(("--limits", "--minutes", "--page"), "tests/study/study.py")
-OF_DO_PY["--simulated"] = "client/examples/stream/hand_stream.py"
-OF_DO_PY["--confusion"] = "client/examples/spell.py"
-OF_DO_PY["--shapes"] = "tests/study/tracked_errors.py"
-OF_DO_PY["--platform"] = "client/blender/build_extension.py"
-CAPTURE = "client/glovecal_client/capture/command.py"
-OF_DO_PY |= dict.fromkeys(("--install-unit", "--log-limit"), CAPTURE)  # of glovecal-capture alone
 COMMAND: Any = command()
 
 
@@ -45,12 +38,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_options_named_alone_exist(page: Path) -> None:
-    everywhere = _all_options(COMMAND) | {"--help"}
-    for option in re.findall(r"`(--[a-z][a-z-]*)", page.read_text()):
-        if option in OF_DO_PY:
-            assert option in (ROOT / OF_DO_PY[option]).read_text()
-        else:
-            assert option in everywhere, option
+    everywhere = _all_options(COMMAND) | _options_of_programs() | {"--help"}
+    assert set(re.findall(r"`(--[a-z][a-z-]*)", page.read_text())) <= everywhere
 
 
 def test_verbs_of_do_py_exist() -> None:
@@ -58,6 +47,14 @@ def test_verbs_of_do_py_exist() -> None:
     for page in PAGES:
         for verb in re.findall(r"python3 do\.py ([a-z]+)", page.read_text()):
             assert f"python3 do.py {verb} " in verbs, f"{page.name}: {verb}"
+
+
+@cache
+def _options_of_programs() -> frozenset[str]:
+    """Of what has options beside `glovecal`: `do.py` and what it runs, capture, the examples."""
+    programs = [ROOT / "do.py", *(ROOT / "client").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]
+    found = (re.findall(r'add_argument\(\s*"(--[a-z-]+)"', each.read_text()) for each in programs)
+    return frozenset(chain.from_iterable(found))
 
 
 def _commands(text: str) -> list[str]:

@@ -78,6 +78,12 @@ def quick_recorder(settings: Settings, stopped: threading.Event, started: Callab
     recorder.run_recorder(settings, stopped, started)
 
 
+def patient_recorder(settings: Settings, stopped: threading.Event, started: Callable[[], None]) -> None:
+    """The recorder process; another one has the time to be started again, however busy the computer is."""
+    recorder.TAKE_OVER_AFTER_S = 100.0
+    recorder.run_recorder(settings, stopped, started)
+
+
 def logged(settings: Settings) -> list[Path]:
     """Oldest first."""
     logs = (settings.data / "captured" / "capture" / "lab" / GLOVE).glob("*.glvlog")

@@ -12,8 +12,8 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
-from realtime_support import LAYOUT, SteadyDevice, eventually, free_endpoint, part_of_service
-from recorder_support import GLOVE, capturing, goes_on, quick_recorder, store_with_glove
+from realtime_support import LAYOUT, SteadyDevice, Work, eventually, free_endpoint, part_of_service
+from recorder_support import GLOVE, capturing, goes_on, patient_recorder, quick_recorder, store_with_glove
 
 from glovecal_client import Recording
 from glovecal_service.serve import real_time
@@ -28,12 +28,13 @@ class Service:
     """Of two; ``process`` is its recorder."""
 
     settings: Settings
+    recorder: Work = quick_recorder
     process: SpawnProcess | None = None
     opened: ExitStack | None = None
 
     def start(self) -> None:
         self.opened = ExitStack()
-        self.process = self.opened.enter_context(part_of_service(quick_recorder, self.settings))
+        self.process = self.opened.enter_context(part_of_service(self.recorder, self.settings))
 
     def end(self) -> None:
         if self.opened is not None and self.process is not None:
@@ -48,7 +49,7 @@ class Service:
 
 
 @contextmanager
-def two_services(tmp_path: Path) -> Iterator[tuple[Store, list[Service]]]:
+def two_services(tmp_path: Path, recorder: Work = quick_recorder) -> Iterator[tuple[Store, list[Service]]]:
     """With a glove that is captured; recorders are to be started. The routers are processes of their own, so
     that a recorder can be killed alone."""
     endpoints = [free_endpoint(), free_endpoint()]
@@ -57,7 +58,8 @@ def two_services(tmp_path: Path) -> Iterator[tuple[Store, list[Service]]]:
             Settings(
                 data=tmp_path / f"data{number}", database=f"sqlite:///{tmp_path / 'shared.sqlite3'}",
                 artifacts=None, zenoh=endpoints[number], zenoh_peers=endpoints[1 - number], site="lab",
-            )
+            ),
+            recorder,
         )
         for number in range(2)
     ]  # fmt: skip
@@ -122,7 +124,7 @@ def test_two_recorders_make_one_take_and_the_other_goes_on_when_one_is_gone_for_
 
 
 def test_a_recorder_that_comes_back_keeps_what_it_began(tmp_path: Path) -> None:
-    with two_services(tmp_path) as (store, services):
+    with two_services(tmp_path, patient_recorder) as (store, services):
         record = store.recordings.request(GLOVE, name="walk", lead_s=0.0)
         first = keeper_of(store, record.id, services)
         for _ in range(2):
