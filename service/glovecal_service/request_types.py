@@ -16,6 +16,7 @@ from pydantic import (
 
 from glovecal_models.errors import BadInput
 from glovecal_models.names import did_you_mean
+from glovecal_models.presentation.field_descriptions import describe_fields
 
 ID = r"^[0-9a-f]{12}$"
 IDENTIFIER = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -62,7 +63,7 @@ Millimetres = Annotated[FiniteFloat, Field(gt=0, lt=1000)]
 class StrictBody(BaseModel):
     """Takes exactly the documented fields and types: nothing is coerced, nothing is ignored."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(strict=True, extra="forbid", json_schema_extra=describe_fields)
 
     @model_validator(mode="before")
     @classmethod

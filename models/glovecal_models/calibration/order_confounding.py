@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from glovecal_models.limit import limit
+from glovecal_models.presentation.document import answer
 from glovecal_models.takes.take import Take
 
 SHIFTS = 199
@@ -49,7 +50,7 @@ class TrainingLimits:
 TRAINING_LIMITS = TrainingLimits()
 
 
-@dataclass(frozen=True)
+@answer
 class OrderConfounding:
     """One rotation in one wearing."""
 

@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
 from glovecal_models.installation import not_installed
+from glovecal_models.presentation.field_descriptions import describe_fields
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ GAP = "..."
 def answer(cls: type[Result]) -> type[Result]:
     """A frozen dataclass whose attributes' docstrings describe its fields in a schema."""
     # What follows from other fields has a default and is worked out in __post_init__, also when read back.
-    cls.__pydantic_config__ = {"use_attribute_docstrings": True}  # pyright: ignore[reportAttributeAccessIssue]
+    cls.__pydantic_config__ = {"json_schema_extra": describe_fields}  # pyright: ignore[reportAttributeAccessIssue]
     return dataclass(frozen=True, repr=not issubclass(cls, Answer))(cls)
 
 

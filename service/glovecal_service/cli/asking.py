@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from inspect import Parameter, Signature, signature
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
@@ -11,6 +12,7 @@ import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from glovecal_models.presentation.field_descriptions import description_of
 from glovecal_service.cli.terminal.connection import connect, subject_names
 from glovecal_service.cli.terminal.options import AsJson, Model
 from glovecal_service.cli.terminal.presenting import present
@@ -42,9 +44,7 @@ SubjectOrModel = Annotated[
 def verb(question: Question) -> Callable[..., None]:
     """The question's verb, for ``typer``."""
     detail = question.detail
-    fields = {
-        name: field for who in question.of for name, field in body_of(question, who).model_fields.items()
-    }
+    fields = _fields(*(body_of(question, who) for who in question.of))
 
     def ask(report: Any, overwrite: bool, as_json: bool, **given: Any) -> None:
         who = given.pop(of.name)
@@ -86,7 +86,7 @@ def wait_for_ceiling(
 
 def verb_at_once(question: AtOnce) -> Callable[..., None]:
     """The verb of a question about a model, for ``typer``."""
-    fields = question.request.model_fields
+    fields = _fields(question.request)
 
     def ask(model: str, as_json: bool, **given: Any) -> None:
         with connect() as service:
@@ -121,7 +121,7 @@ def options_of(request: type[BaseModel], *names: str) -> Callable[[Callable[...,
             own(**given, asked={name: value for name, value in asked.items() if value is not None})
 
         kept = [item for item in signature(own, eval_str=True).parameters.values() if item.name != "asked"]
-        fields = request.model_fields
+        fields = _fields(request)
         parameters = [
             *(_parameter(item.name, item.annotation, item.default) for item in kept),
             *(_parameter(name, *_option(name, fields[name])) for name in names),
@@ -132,6 +132,16 @@ def options_of(request: type[BaseModel], *names: str) -> Callable[[Callable[...,
         return ask
 
     return with_options
+
+
+def _fields(*requests: type[BaseModel]) -> dict[str, FieldInfo]:
+    """With their docstrings as descriptions."""
+    fields = {}
+    for request in requests:
+        for name, field in request.model_fields.items():
+            fields[name] = described = copy(field)
+            described.description = field.description or description_of(request, name)
+    return fields
 
 
 def _body(fields: Mapping[str, FieldInfo], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.improvement.answer import EffectRemoved
@@ -22,10 +22,9 @@ from glovecal_service.store.records import JobRecord
 
 
 class RemovalRequest(BaseModel):
-    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid")
 
-    activate: bool = False
-    """Predict live with the child."""
+    activate: bool = Field(False, description="Predict live with the child.")
 
 
 def begin(store: Store, query: RemovalRequest, id: str, name: str) -> Begun:
