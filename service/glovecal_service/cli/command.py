@@ -6,7 +6,6 @@ full disk), 2 wrong use of the command, 3 no service reached, 130 interrupted.
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
 import sys
@@ -51,9 +50,6 @@ from glovecal_service.questions.catalogue import AT_ONCE, QUESTIONS
 from glovecal_service.secret_files import settle_secrets
 
 HELP = ["-h", "--help"]
-SELDOM = (20_000, 20, 20)
-"""Thresholds of the garbage collector: with Python's own it goes through all that a verb imports again and
-again, for a tenth of the time that the verb takes to start."""
 
 app = typer.Typer(
     name="glovecal",
@@ -150,7 +146,6 @@ def _name_help(verb: Any) -> None:
 def script() -> NoReturn:
     """Entry point of the ``glovecal`` script."""
     _leave_start_folder()
-    gc.set_threshold(*SELDOM)
     handle_signals(_stop, *(number for number in STOP_SIGNALS if number != signal.SIGINT), *HANG_UP)
     run_command(main)
 
