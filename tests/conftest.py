@@ -88,6 +88,15 @@ COMPUTING = ("models", "paper", "study", "architecture")
 TOGETHER = ("tests/models/colour_glove/", "tests/service/studio/", "tests/models/library/")
 """Folders whose files share something that is made once in a process, and slowly: compiled kernels and a
 database of poses, a service with a browser, a trained model."""
+LONG = {
+    "tests/service/site/test_remote_workers.py", "tests/models/improvement/test_second_names.py",
+    "tests/service/test_sampling_service.py", "tests/service/test_serve_processes.py",
+    "tests/docs/test_docs_printed.py", "tests/windows_like/test_windows_like.py",
+    "tests/service/cli/test_cli_trigger.py", "tests/service/test_encrypted_data_folder.py",
+    "tests/service/cli/test_cli_live.py", "tests/service/test_secret_files.py",
+    "tests/docs/test_docs_site.py", "tests/models/calibration/test_kernel_choice.py",
+}  # fmt: skip
+"""Files of a minute and more: the last files to be begun are short, so that all processes end together."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -105,11 +114,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that compute come between files that wait for gloves, cables and pages: both at once. Folders
-    that one process runs as a whole come first: nobody waits for the last of them."""
+    that one process runs as a whole come first, then long files: nobody waits for the last of them."""
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.path, []).append(item)
     here = Path(__file__).parent
+    assert all((here.parent / name).is_file() for name in LONG), "no such file: write LONG anew"
     kinds: dict[bool, list[Path]] = {True: [], False: []}
     place: dict[Path, float] = {}
     for path in files:
@@ -119,6 +129,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         else:
             kinds[within.split("/")[1] in COMPUTING].append(path)
     for paths in kinds.values():
+        paths.sort(key=lambda path: path.relative_to(here.parent).as_posix() not in LONG)
         place |= {path: (number + 0.5) / len(paths) for number, path in enumerate(paths)}
     items[:] = [item for path in sorted(files, key=place.__getitem__) for item in files[path]]
 
