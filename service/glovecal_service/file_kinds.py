@@ -11,7 +11,7 @@ from glovecal_client.encryption.kept_file import open_kept
 from glovecal_service.exports.motion_files import formats as motion_files
 from glovecal_service.exports.vendor_calibrations import formats as vendor_calibrations
 
-FileKind = Literal["model", "calibration", "motion", "card", "table"]
+FileKind = Literal["model", "calibration", "motion", "card", "video", "table"]
 LOOKED_AT = 65536
 """Bytes from the beginning: a card writes its first record within some hundred."""
 
@@ -43,9 +43,16 @@ def _is_card(start: bytes) -> bool:
     return b"\0" in start and card_layout(start) is not None
 
 
+def _is_video(start: bytes) -> bool:
+    """MP4 and QuickTime, Matroska and WebM, AVI."""
+    is_boxes = start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide") and b"\0" in start[:4]
+    return is_boxes or start[:4] == b"\x1aE\xdf\xa3" or (start[:4] == b"RIFF" and start[8:12] == b"AVI ")
+
+
 _KINDS: dict[FileKind, Callable[[bytes], bool]] = {
     "model": _is_model,
     "calibration": _is_calibration,
     "motion": _is_motion,
     "card": _is_card,
+    "video": _is_video,
 }

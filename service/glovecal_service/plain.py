@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import datetime
@@ -87,3 +88,8 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
             with suppress(SystemError):
                 _adapters[kind] = TypeAdapter(kind)
         return _adapters[kind] if kind in _adapters else TypeAdapter(kind)
+
+
+def video_name(filename: str) -> str:
+    """The name that a video is kept under where nobody names it: its own, as names are written."""
+    return re.sub(r"[^a-z0-9_-]+", "-", PurePath(filename).stem.lower()).strip("-_")[:64] or "video"

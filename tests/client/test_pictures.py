@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import json
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loopback import eventually
+from phone_videos import phone_video
 
 from glovecal_client.errors import BadOption, DeviceError, DeviceFinished, DeviceLost
 from glovecal_client.pictures.recording import VideoRecording
 from glovecal_client.pictures.source import Picture, RenderedPictures, build_source
-from glovecal_client.pictures.video_file import VideoFilePictures, VideoWriter, times_path
+from glovecal_client.pictures.video_file import (
+    VideoFilePictures,
+    VideoWriter,
+    _settled,
+    times_path,
+    write_times,
+)
 
-pytest.importorskip("cv2")
+cv2 = pytest.importorskip("cv2")
 
 
 def read_to_the_end(source: VideoFilePictures) -> None:
@@ -84,7 +92,7 @@ def test_files_are_never_overwritten_and_stamps_are_needed(tmp_path: Path) -> No
     (tmp_path / "b.mkv").write_bytes(b"")
     with pytest.raises(DeviceError, match="exists already"):
         VideoWriter(tmp_path / "b.mkv", 30.0)
-    with pytest.raises(DeviceLost, match="has no time stamps"):
+    with pytest.raises(DeviceLost, match="cannot be read as a video"):
         VideoFilePictures(tmp_path / "b.mkv").open()
     times_path(tmp_path / "b.mkv").write_text("picture,monotonic_ns,wall_ns\n0,now,2\n")
     with pytest.raises(DeviceLost, match="whole nanoseconds"):
@@ -111,3 +119,99 @@ def test_a_video_that_ends_in_the_middle_says_how_much_there_is_and_that_it_was_
     with pytest.raises(DeviceFinished, match=rf"ends in the middle: \d+ of {video.pictures} pictures"):
         read_to_the_end(source)
     source.close()
+
+
+def bars(count: int, height: int = 48, width: int = 64) -> list[np.ndarray]:
+    """A bright bar along the upper edge, as many columns long as the picture's number."""
+    found = []
+    for number in range(count):
+        picture = np.zeros((height, width, 3), np.uint8)
+        picture[: height // 4, : 2 * number + 2] = 255
+        found.append(picture)
+    return found
+
+
+def read_all(source: VideoFilePictures) -> list[Picture]:
+    source.open()
+    found: list[Picture] = []
+
+    def read_on() -> None:
+        while True:
+            found.append(source.read())
+
+    with pytest.raises(DeviceFinished):
+        read_on()
+    source.close()
+    return found
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mov"])
+def test_a_phones_video_has_its_own_uneven_times(tmp_path: Path, suffix: str) -> None:
+    durations_ms = [17 + 8 * (number % 4) for number in range(24)]
+    phone_video(tmp_path / f"phone{suffix}", bars(24), durations_ms)
+    source = VideoFilePictures(tmp_path / f"phone{suffix}")
+    found = read_all(source)
+    assert [picture.monotonic_ns for picture in found] == [
+        10**6 * sum(durations_ms[:number]) for number in range(24)
+    ]
+    assert source.stamps.sentence == "the file's own times, a variable rate, 24.4 to 58.8 Hz"
+    assert not source.stamps.of_this_computer
+    assert found[0].pixels.shape == (48, 64, 3)
+
+
+@pytest.mark.parametrize("rate_hz", [5, 25, 50, 125])
+def test_an_even_rate_is_told(tmp_path: Path, rate_hz: int) -> None:
+    phone_video(tmp_path / "a.mp4", bars(10), [1000 // rate_hz] * 10)
+    source = VideoFilePictures(tmp_path / "a.mp4")
+    source.open()
+    assert source.stamps.sentence == f"the file's own times, {rate_hz:.2f} Hz"
+    assert source.rate_hz == pytest.approx(rate_hz)
+    source.close()
+
+
+def test_a_phone_held_upright_gives_upright_pictures(tmp_path: Path) -> None:
+    for turned_deg, bright in ((0, np.s_[:12, :8]), (90, np.s_[:8, -12:]), (180, np.s_[-12:, -8:])):
+        phone_video(tmp_path / f"{turned_deg}.mp4", bars(4)[3:] * 4, [40] * 4, turned_deg=turned_deg)
+        (picture, *_) = read_all(VideoFilePictures(tmp_path / f"{turned_deg}.mp4"))
+        height, width = (64, 48) if turned_deg == 90 else (48, 64)
+        assert picture.pixels.shape == (height, width, 3)
+        assert picture.pixels[bright].mean() > 200
+
+
+def test_a_file_without_times_says_what_is_taken_for_them(tmp_path: Path) -> None:
+    writer = cv2.VideoWriter(
+        str(tmp_path / "old.avi"), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"MJPG"), 20.0, (64, 48)
+    )
+    for picture in bars(6):
+        writer.write(picture)
+    writer.release()
+    source = VideoFilePictures(tmp_path / "old.avi")
+    found = read_all(source)
+    assert [picture.monotonic_ns for picture in found] == [50_000_000 * number for number in range(6)]
+    assert source.stamps.sentence == (
+        "the file has no times of its pictures: taken as even, 20.00 Hz, as its header says"
+    )
+
+
+@pytest.mark.parametrize(
+    ("times_ms", "said_hz", "told"),
+    [
+        ([0.0] * 5, 25.0, "25.00 Hz, as its header says"),
+        ([0.0, 40.0, 10.0, 5.0, 3.0], 0.0, "30.00 Hz, which is assumed"),
+        ([7.0, 40.0, 74.0, 107.0, 140.0], 30.0, "the file's own times, 30.08 Hz"),
+        ([12.0], 25.0, "the file's own times"),
+    ],
+)
+def test_stamps_that_do_not_increase_are_none(times_ms: list[float], said_hz: float, told: str) -> None:
+    settled, sentence = _settled(times_ms, said_hz, has_stamps=True)
+    assert told in sentence
+    assert settled[0] == 0.0
+    assert all(later > before for before, later in pairwise(settled))
+
+
+def test_times_that_were_written_beside_a_video_count(tmp_path: Path) -> None:
+    phone_video(tmp_path / "a.mp4", bars(5), [40] * 5)
+    stamps = [(10**9 * number, 5 * 10**18) for number in range(5)]
+    write_times(tmp_path / "a.mp4", stamps)
+    source = VideoFilePictures(tmp_path / "a.mp4")
+    assert [(picture.monotonic_ns, picture.wall_ns) for picture in read_all(source)] == stamps

@@ -171,7 +171,7 @@ def _code_row(
 
 
 def _held_out(seed: int, quick: bool) -> _HeldOut:
-    poses, rng = generated_poses(PAPER_COUNT, seed=seed), np.random.default_rng([seed, 8])
+    poses, rng = generated_poses(PAPER_COUNT, seed=seed, free=0.0), np.random.default_rng([seed, 8])
     order = rng.permutation(len(poses))
     count = QUICK_HELD_OUT if quick else HELD_OUT
     angles, turns = poses[order[:count]], orientations(count, DatabaseSettings().cone_deg, rng)

@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from other_gloves import other_hand
 from scipy.spatial.transform import Rotation
 
 from glovecal_models.colour_glove.camera_model import Camera
@@ -26,10 +27,15 @@ from glovecal_models.colour_glove.database import (
 from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import printed_pattern
-from glovecal_models.colour_glove.photograph import ASIDE, FARTHEST_MM, NEAREST_MM, Photographer, Photography
-from glovecal_models.colour_glove.pictures.classify import ColourTable
-from glovecal_models.colour_glove.pose.error_learning import CLIPS, drawn_colours, learned_errors, other_hand
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
+from glovecal_models.colour_glove.photograph import (
+    ASIDE,
+    FARTHEST_MM,
+    NEAREST_MM,
+    Photographer,
+    Photography,
+)
+from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_colours
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, shipped_errors
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
@@ -41,7 +47,7 @@ PROOF_SEED = 2009
 EXPOSURE_S = 0.01
 _LENS = (-0.12, 0.05, 0.0005, -0.0004, 0.0)
 _APART_DEG, _MEETING_MM = 60.0, 470.0
-_QUICK_ENTRIES, _QUICK_CLIPS = 600, 4
+_QUICK_ENTRIES = 600
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,25 +62,21 @@ class Scene:
 
     @cached_property
     def colours(self) -> ColourTable:
-        return drawn_colours(self.hand)
+        return drawn_colours(self.hand.skin, self.hand.pattern)
 
     @cached_property
     def lookup(self) -> PoseLookup:
         entries = _QUICK_ENTRIES if self.quick else ENTRIES
         database = pose_database(
-            self.hand.skin, self.hand.pattern, generated_poses(PAPER_COUNT), self.folder,
+            self.hand.skin, self.hand.pattern, generated_poses(PAPER_COUNT, free=0.0), self.folder,
             DatabaseSettings(entries), workers=1, report=part(self.report, 0.0, 0.2),
         )  # fmt: skip
         return PoseLookup(database, pca_code(database.transforms))
 
     def tracker(self, count: int, stage: str, *, follows: bool = False) -> HandTracker:
-        """With ``count`` cameras; their errors are learned once."""
-        views = cameras(count)
-        errors = learned_errors(
-            self.hand, self.lookup, views, clips=_QUICK_CLIPS if self.quick else CLIPS, workers=1,
-            report=part(self.report, 0.2, 0.5),
-        )  # fmt: skip
-        return HandTracker(self.hand, self.lookup, views, errors, stage=stage, follows=follows)
+        """With ``count`` cameras."""
+        errors = shipped_errors(count, "right")
+        return HandTracker(self.hand, self.lookup, cameras(count), errors, stage=stage, follows=follows)
 
     def skin(self, whose: str, seed: int) -> HandSkin:
         return self.hand.skin if whose == HANDS[0] else other_hand(self.hand.skin, seed)
@@ -106,7 +108,7 @@ def cameras(count: int) -> tuple[Camera, ...]:
 def held_out_states(skin: HandSkin, count: int, seed: int = PROOF_SEED) -> list[HandState]:
     """Configurations that the database was not made of, fingers up to 75 degrees from upright."""
     rng = np.random.default_rng([seed, 5])
-    angles, turns = generated_poses(count, seed=seed), orientations(count, 75.0, rng)
+    angles, turns = generated_poses(count, seed=seed, free=0.0), orientations(count, 75.0, rng)
     found = []
     for bend, turn in zip(angles, turns, strict=True):
         depth = rng.uniform(NEAREST_MM, FARTHEST_MM)

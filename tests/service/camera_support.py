@@ -22,12 +22,10 @@ from glovecal_client.errors import DeviceFinished
 from glovecal_client.pictures.source import Picture
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import DatabaseSettings, pose_database
-from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM
-from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
+from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
-from glovecal_models.colour_glove.pose.error_learning import errors_file
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, LearnedErrors
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import generated_poses
 from glovecal_models.colour_glove.skin import hand_skin
@@ -36,7 +34,7 @@ from glovecal_service.camera.camera_settings import CameraSettings, TrackingSett
 from glovecal_service.camera.camera_tracking import CameraSummary, CameraTracking
 from glovecal_service.camera.tracking_setup import ASSUMED, RATE_HZ, RenderedGlove, glove_colours
 
-SMALL: dict[str, Any] = {"entries": 300, "clips": 3}
+SMALL: dict[str, Any] = {"entries": 300}
 
 
 BESIDE = Camera(translation_mm=(-60.0, 0.0, 0.0))
@@ -76,12 +74,7 @@ def _made_once() -> Path:
 def _make(folder: Path) -> None:
     skin = hand_skin()
     hand, settings = PrintedHand(skin, printed_pattern()), DatabaseSettings(entries=SMALL["entries"])
-    database = pose_database(skin, hand.pattern, generated_poses(), folder, settings, workers=1)
-    lookup = PoseLookup(database, pca_code(database.transforms))
-    deviation = np.array([15.0] * 20 + [15.0] * 3 + [20.0, 20.0, 60.0])
-    errors = LearnedErrors.as_posterior(np.diag(deviation**2), np.full(DEGREES_OF_FREEDOM, 60.0))
-    for cameras in ((ASSUMED,), (ASSUMED, BESIDE)):
-        errors.save(errors_file(hand, lookup, cameras, SMALL["clips"]))
+    pose_database(skin, hand.pattern, generated_poses(), folder, settings, workers=1)
     glove_colours(folder, hand)
 
 
@@ -92,7 +85,7 @@ def prepared_once() -> Iterator[None]:
     really, check, known = setup_module.prepared_tracker, setup_module.PictureCheck, dict[Any, Any]()
 
     def prepared(folder: Path, cameras: Sequence[Camera], **options: Any) -> HandTracker:
-        key = (folder, tuple(cameras), options["entries"], options["clips"])
+        key = (folder, tuple(cameras), options["entries"])
         if key not in known:
             known[key] = really(folder, cameras, **options)
         return known[key]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simulated_camera import lasting_noise
-from tracked_errors import TrackedHand, cameras, correlations, table
+from tracked_errors import correlations, table
+from tracked_hands import TrackedHand, cameras
 
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
 
@@ -16,9 +17,8 @@ def known(number: int, *, stays: float, lasts_s: float, times: float) -> Tracked
     truth = 30.0 + 15.0 * lasting_noise(frames / 30.0, columns, 0.5, rng)
     error = np.sqrt(1 - stays**2) * lasting_noise(frames / 30.0, columns, lasts_s / 2, rng)
     error += stays * rng.standard_normal(columns)
-    return TrackedHand(
-        frames, truth, 4.0 * times * error, np.full_like(truth, 4.0), np.ones(truth.shape, bool)
-    )
+    sd, accepted = np.full_like(truth, 4.0), np.ones(truth.shape, bool)
+    return TrackedHand("soft", frames, truth, 4.0 * times * error, sd, accepted, (90, 100), None)
 
 
 def test_how_large_and_how_lasting_errors_are_is_told():
@@ -31,6 +31,7 @@ def test_how_large_and_how_lasting_errors_are_is_told():
     lasting = float(text.partition("Errors last ")[2].partition(" s")[0])
     assert lasting == pytest.approx(0.8, abs=0.12)
     assert "lean to the prior 0.0" in text.replace("-0.0", "0.0")
+    assert "In soft light 90 % of the glove's pixels are right" in text
     kinds = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")][1:]
     assert kinds == ["MCP", "PIP", "DIP", "IP", "TMC", "ABD", "VIR"]
 

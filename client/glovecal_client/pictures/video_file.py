@@ -3,6 +3,9 @@
 ``NAME.mkv`` and ``NAME.times.csv`` (``picture``, ``monotonic_ns``, ``wall_ns``): a container's own stamps are
 rounded, and say nothing of the computer's clock. ``NAME.json`` says what it is of.
 
+Videos of phones and other cameras are read too (``SUFFIXES``): upright, as the file says it was held, and
+with the container's stamps, which count from the file's beginning and need not be even.
+
 A preview is a small copy, to be looked at beside a take: a ZIP file without compression, with ``video.json``
 and JPEG pictures from ``000000.jpg`` onwards. The pictures as they came stay in the video.
 """
@@ -12,6 +15,10 @@ from __future__ import annotations
 import csv
 import json
 import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +30,14 @@ from glovecal_client.pictures.encrypted_video import EncryptedVideo, VideoStream
 from glovecal_client.pictures.source import Picture, opencv
 
 SUFFIX = ".mkv"
+SUFFIXES = (SUFFIX, ".mp4", ".mov", ".m4v", ".webm", ".avi")
+"""Of videos that are read; the first is what is written here."""
+EVENLY = (".avi",)
+"""Containers that hold a rate and no stamps."""
+SAME_RATE = 1.1
+"""Longest and shortest interval that count as an even rate, quotient."""
+USUAL_HZ = 30.0
+OF_COMPUTER = "times of the recording computer"
 COLUMNS = ("picture", "monotonic_ns", "wall_ns")
 
 
@@ -91,8 +106,20 @@ class VideoWriter:
             )
 
 
+@dataclass(frozen=True)
+class VideoStamps:
+    """When each picture of a video was taken."""
+
+    times_ns: list[tuple[int, int]]
+    """Monotonic and wall time."""
+    of_this_computer: bool
+    """Whether they are by the clock of the computer that filmed; else they count from the first picture."""
+    sentence: str
+    """Where they come from, and how even they are."""
+
+
 class VideoFilePictures:
-    """A video that was written here, with its stamps; one without a table has none and is refused."""
+    """A video with its stamps: those of the table beside it, else its container's."""
 
     def __init__(self, path: Path) -> None:
         self.name: str = f"video:{path}"
@@ -106,20 +133,57 @@ class VideoFilePictures:
         self._stream: VideoStream | None = None
         self._stamps: list[tuple[int, int]] = []
 
+    @cached_property
+    def stamps(self) -> VideoStamps:
+        """Without a table all of the video is gone through once. Raises DeviceLost for what is no video."""
+        if not times_path(self._path).exists():
+            return self._stamps_of_container()
+        imported = read_about(self._path).get("times")
+        if isinstance(imported, str):
+            return VideoStamps(read_times(self._path), False, imported)
+        return VideoStamps(read_times(self._path), True, OF_COMPUTER)
+
     def open(self) -> None:
         self.close()
-        self._stamps = read_times(self._path)
+        self._stamps = self.stamps.times_ns
         self.about = read_about(self._path)
         self.simulated: bool = self.about.get("simulated") is True
         if len(self._stamps) > 1:
             span_s = (self._stamps[-1][0] - self._stamps[0][0]) / 1e9
             self.rate_hz: float = (len(self._stamps) - 1) / max(span_s, 1e-3)
+        self._video, self._number = self._opened(), 0
+
+    def _stamps_of_container(self) -> VideoStamps:
         video = self._opened()
-        if not video.isOpened():
-            raise DeviceLost(f"{self._path} cannot be read as a video")
-        self._video, self._number = video, 0
+        try:
+            stated_hz = float(video.get(self._cv2.CAP_PROP_FPS))
+            times_ms = []
+            while video.grab():
+                times_ms.append(float(video.get(self._cv2.CAP_PROP_POS_MSEC)))
+            ended_ns = self._path.stat().st_mtime_ns
+        finally:
+            video.release()
+            self._close_stream()
+        if not times_ms:
+            raise DeviceLost(f"{self._path} holds no picture that can be read")
+        times_ms, sentence = _settled(times_ms, stated_hz, has_stamps=self._path.suffix.lower() not in EVENLY)
+        began_ns = ended_ns - round(1e6 * times_ms[-1])  # a file is written last when its filming ends
+        stamps = [(round(1e6 * at), began_ns + round(1e6 * at)) for at in times_ms]
+        return VideoStamps(stamps, False, sentence)
 
     def _opened(self) -> Any:
+        """Raises DeviceLost for what is no video."""
+        try:
+            video = self._capture()
+        except self._cv2.error as error:
+            raise DeviceLost(f"{self._path} cannot be read as a video") from error
+        if not video.isOpened():
+            video.release()
+            self._close_stream()
+            raise DeviceLost(f"{self._path} cannot be read as a video")
+        return video
+
+    def _capture(self) -> Any:
         try:
             if not is_kept_encrypted(self._path):
                 return self._cv2.VideoCapture(str(self._path))
@@ -149,9 +213,45 @@ class VideoFilePictures:
         video, self._video = self._video, None
         if video is not None:
             video.release()
+        self._close_stream()
+
+    def _close_stream(self) -> None:
         stream, self._stream = self._stream, None
         if stream is not None:
             stream.close()
+
+
+def _settled(times_ms: list[float], stated_hz: float, *, has_stamps: bool) -> tuple[list[float], str]:
+    """Times that begin at 0, and where they come from. Stamps that do not increase are none: then the rate
+    that the file says counts, else the usual one."""
+    steps = [later - before for before, later in pairwise(times_ms)]
+    increasing = sum(step > 0 for step in steps)
+    if has_stamps and increasing >= 0.9 * len(steps):
+        shortest, longest = _ends([step for step in steps if step > 0] or [1e3 / USUAL_HZ])
+        how = f"{1e3 * len(steps) / max(times_ms[-1] - times_ms[0], 1e-3):.2f} Hz"
+        if longest > SAME_RATE * shortest + 1.0:  # stamps of some containers are whole milliseconds
+            how = f"a variable rate, {1e3 / longest:.1f} to {1e3 / shortest:.1f} Hz"
+        return [at - times_ms[0] for at in times_ms], f"the file's own times, {how}"
+    is_credible = 1.0 <= stated_hz <= 1000.0
+    rate_hz = stated_hz if is_credible else USUAL_HZ
+    whose = "as its header says" if is_credible else "which is assumed: its header says none"
+    return [1e3 * row / rate_hz for row in range(len(times_ms))], (
+        f"the file has no times of its pictures: taken as even, {rate_hz:.2f} Hz, {whose}"
+    )
+
+
+def _ends(steps: list[float]) -> tuple[float, float]:
+    """The 5th and the 95th percentile."""
+    ordered = sorted(steps)
+    return ordered[len(ordered) // 20], ordered[-1 - len(ordered) // 20]
+
+
+def write_times(video: Path, times_ns: Sequence[tuple[int, int]]) -> None:
+    """The table of stamps beside a video."""
+    with times_path(video).open("w", encoding="utf-8", newline="") as stream:
+        table = csv.writer(stream)
+        table.writerow(COLUMNS)
+        table.writerows([number, *stamp] for number, stamp in enumerate(times_ns))
 
 
 def read_times(video: Path) -> list[tuple[int, int]]:

@@ -94,15 +94,14 @@ class Camera:
 
     def scaled(self, factor: int) -> Camera:
         """The same view in a picture ``factor`` times finer: its pixels share out the old ones'."""
-        fx, fy = (focal * factor for focal in self.focal_px)
-        cu, cv = ((centre + 0.5) * factor - 0.5 for centre in self.centre_px)
-        return replace(
-            self,
-            width=self.width * factor,
-            height=self.height * factor,
-            focal_px=(fx, fy),
-            centre_px=(cu, cv),
-        )
+        return self.resized(self.width * factor, self.height * factor)
+
+    def resized(self, width: int, height: int) -> Camera:
+        """The same view in a picture of another size, of which each pixel covers the same part."""
+        shares = width / self.width, height / self.height
+        fx, fy = (focal * share for focal, share in zip(self.focal_px, shares, strict=True))
+        cu, cv = ((centre + 0.5) * share - 0.5 for centre, share in zip(self.centre_px, shares, strict=True))
+        return replace(self, width=width, height=height, focal_px=(fx, fy), centre_px=(cu, cv))
 
     def _pixels(self, directions: np.ndarray) -> np.ndarray:
         return self._distorted(directions) * self.focal_px + self.centre_px

@@ -11,7 +11,8 @@ image distance (``do.py paper --part colour-glove`` compares them).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numba
@@ -46,6 +47,14 @@ class Neighbours:
     """(K,)."""
     distances: np.ndarray
     """(K,): image distances, squared pixels."""
+    quarter_turns: int = 0
+    """Against the clock, that the picture was turned by before it was looked up."""
+
+    @property
+    def turn(self) -> np.ndarray:
+        """(3, 3): from the camera's frame to that of a camera that sees the picture as it was looked up."""
+        quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        return np.linalg.matrix_power(quarter, self.quarter_turns)
 
     @property
     def weights(self) -> np.ndarray:
@@ -78,6 +87,23 @@ class PoseLookup:
         order = np.argsort(apart, kind="stable")[:count]
         return Neighbours(candidates[order], apart[order])
 
+    def neighbours_of_any_turn(
+        self, tiny: np.ndarray, near_px2: float = 0.0, turns: Sequence[int] = (0, 1, 2, 3)
+    ) -> Neighbours:
+        """As ``neighbours``, of the tiny image turned by quarters of a circle: whichever is nearest.
+
+        The database holds hands whose fingers point upwards or aside; a hand that points down, or a picture
+        on its side, is such a hand once it is turned. The first of ``turns`` with an entry within
+        ``near_px2`` is taken.
+        """
+        found = []
+        for quarter_turns in turns:
+            each = self.neighbours(np.ascontiguousarray(np.rot90(tiny, quarter_turns)))
+            found.append(replace(each, quarter_turns=quarter_turns))
+            if each.distances[0] <= near_px2:
+                return found[-1]
+        return min(found, key=lambda each: each.distances[0])
+
     def blend(self, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
         """Angles (20,) and rotation (3, 3) before the virtual camera: weighted means, the rotation's in the
         chordal metric."""
@@ -101,6 +127,8 @@ class PoseLookup:
         distance = VIEW_DISTANCE_MM * (focal / VIEW_FOCAL_PX) * (half / window.half)
         # What lay on the virtual camera's axis lies beside the window's centre by as much as it did there.
         offset = (np.full(2, (VIEW_PX - 1) / 2) - (u, v)) * (window.half / half)
+        back = neighbours.turn.T
+        offset, rotation = back[:2, :2] @ offset, back @ rotation
         direction = camera.undistort(np.array([[window.u, window.v]]) + offset)[0]
         ray = np.append(direction, 1.0)
         turn = _turn_from_axis(ray / np.linalg.norm(ray))

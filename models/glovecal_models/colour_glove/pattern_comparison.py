@@ -69,7 +69,7 @@ def ambiguities(
     skin = hand_skin() if skin is None else skin
     rng = np.random.default_rng(seed)
     count = entries + queries
-    angles = rng.permutation(generated_poses(max(count, 2000), seed=seed))[:count]
+    angles = rng.permutation(generated_poses(max(count, 2000), seed=seed, free=0.0))[:count]
     turns = orientations(count, _CONE_DEG, rng)
     centre = palm_centre(skin)
     hands = np.array(

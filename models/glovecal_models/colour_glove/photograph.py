@@ -2,8 +2,8 @@
 
 Light is added up linearly: the printed colour times the shading of a lamp and of the room, cloth with a weave
 and folds, an arm behind the wrist, a background; several moments of one exposure; then the lens's blur, the
-camera's gains (a colour cast), photon and read noise, and eight bits of sRGB. Glossy prints, shadows cast on
-the hand, rolling shutter and JPEG are not drawn.
+camera's gains (a colour cast), photon and read noise, and eight bits of sRGB. A second lamp may have another
+colour, the print may shine, and fingers cast shadows. Rolling shutter and JPEG are not drawn.
 
 A moving hand: natural configurations one after another, the palm turning and drifting before a camera.
 
@@ -24,7 +24,7 @@ from glovecal_models.colour_glove.database import orientations, palm_centre
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.pattern import PRINTED_SRGB, Pattern, encoded_light, linear_light
 from glovecal_models.colour_glove.pose_set import generated_poses
-from glovecal_models.colour_glove.rasterise import rasterise
+from glovecal_models.colour_glove.rasterise import rasterise, z_buffer
 from glovecal_models.colour_glove.skin import HandSkin, posed
 from glovecal_models.errors import BadInput
 
@@ -38,8 +38,14 @@ CONE_DEG = 60.0
 ARMS = ("skin", "sleeve", "none")
 MOMENTS = 5
 """Of an exposure during which the hand moves."""
-EXAMPLES = 8
-"""As many as the paper labelled by hand (section 5.1)."""
+EXAMPLES = 24
+"""The paper labelled 8 by hand (section 5.1), all in one light; these are of many."""
+_LAMP_POINTS, _LAMP_MM, _LAMP_AWAY_MM = 256, 340.0, 20_000.0
+"""What a lamp sees of the hand, to draw shadows: points along a side, their reach, the lamp's distance."""
+_IN_SHADOW_MM = 5.0
+"""Behind what the lamp sees; less is the same surface."""
+_SHARPNESS = 20.0
+"""Of a highlight: Blinn's exponent for the sheen of iron-on film."""
 _AROUND, _ALONG = 24, 8
 _ARM_MM = (-25.0, -300.0)
 _ARM_RADII_MM = {"skin": (22.0, 40.0), "sleeve": (25.0, 40.0)}
@@ -126,7 +132,15 @@ class Photography:
     """Of red, green and blue: the cast of light that the camera was not balanced for."""
     exposure: float = 1.0
     shading: float = 0.6
-    """Share of the light that comes from one lamp; the rest comes from everywhere."""
+    """Share of the light that comes from lamps; the rest comes from everywhere."""
+    second: float = 0.0
+    """Share of the lamps' light that is a second one's, elsewhere in the room."""
+    tint: float = 0.0
+    """How much warmer one lamp and cooler the other is, relative in red and blue."""
+    gloss: float = 0.0
+    """Of the print: a highlight's strength over the lamp's."""
+    shadows: bool = False
+    """Whether hand and arm take light away from themselves."""
     weave: float = 0.05
     """Standard deviation of the cloth's brightness from pixel to pixel, relative."""
     folds: float = 0.3
@@ -140,13 +154,33 @@ class Photography:
     arm: str = "skin"
 
     def __post_init__(self) -> None:
-        amounts = (*self.gains, self.exposure, self.shading, self.weave, self.folds, self.blur_px, self.noise)
+        amounts = (
+            *self.gains, self.exposure, self.shading, self.second, self.tint, self.gloss, self.weave,
+            self.folds, self.blur_px, self.noise,
+        )  # fmt: skip
         if not (np.isfinite(amounts).all() and min(amounts) >= 0 and min(*self.gains, self.exposure) > 0):
             raise BadInput(f"a photograph needs gains and exposure above 0, and no negative amount: {self}")
-        if self.shading > 1 or self.arm not in ARMS:
+        if max(self.shading, self.second, self.tint) > 1 or self.arm not in ARMS:
             raise BadInput(
-                f"shading {self.shading} (0 to 1), arm {self.arm!r} (one of {', '.join(ARMS)}): impossible"
+                f"shading {self.shading}, second {self.second}, tint {self.tint} (0 to 1), arm {self.arm!r} "
+                f"(one of {', '.join(ARMS)}): impossible"
             )
+
+
+def some_light(
+    rng: np.random.Generator, arm: str, gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+) -> Photography:
+    """As rooms have it: from a bright one to two lamps of different colour with shadows and gloss."""
+    return Photography(
+        gains=gains,
+        exposure=float(rng.uniform(0.75, 1.15)),
+        shading=float(rng.uniform(0.3, 0.85)),
+        second=float(rng.choice([0.0, rng.uniform(0.2, 0.5)])),
+        tint=float(rng.uniform(0.0, 0.25)),
+        gloss=float(rng.choice([0.0, rng.uniform(0.0, 0.3)])),
+        shadows=bool(rng.random() < 0.7),
+        arm=arm,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +228,8 @@ class Photographer:
 
     @cached_property
     def _room(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Linear background (H, W, 3), direction to the lamp (3,), weave (H, W), folds of the skin (V, 3)."""
+        """Linear background (H, W, 3), directions to both lamps (2, 3), weave (H, W), folds of the skin
+        (V, 3)."""
         rng, look = np.random.default_rng([self.seed, 0]), self.photography
         height, width = self.camera.height, self.camera.width
         behind = background(width, height, rng, clutter=look.clutter, face=look.face)
@@ -208,7 +243,9 @@ class Photographer:
             wave = np.cos(places @ direction + rng.uniform(0, 2 * np.pi))
             folds += wave[:, None] * direction / np.linalg.norm(direction)
         folds *= look.folds / max(np.sqrt((folds**2).sum(axis=1).mean()), 1e-9)
-        return linear_light(behind), lamp / np.linalg.norm(lamp), weave, folds
+        second = np.array([rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 0.3), rng.uniform(-1.2, -0.5)])
+        lamps = np.stack([lamp / np.linalg.norm(lamp), second / np.linalg.norm(second)])
+        return linear_light(behind), lamps, weave, folds
 
     @property
     def _inks(self) -> np.ndarray:
@@ -229,7 +266,7 @@ class Photographer:
 
     def _light(self, state: HandState) -> tuple[np.ndarray, np.ndarray]:
         """Linear light (H, W, 3) float32 of one moment, and its labels."""
-        behind, lamp, weave, folds = self._room
+        behind, lamps, weave, folds = self._room
         triangles, colours = self._surface
         placed = posed(self.skin, state)
         if self.photography.arm != "none":
@@ -242,15 +279,50 @@ class Photographer:
         normals[: len(folds)] += folds @ state.rotation.T
         facing = normals[triangles[which]].mean(axis=1)
         facing /= np.linalg.norm(facing, axis=1, keepdims=True) + 1e-9
-        lit = 0.5 + 0.5 * (facing @ lamp)  # light wraps around cloth
-        share = self.photography.shading
-        brightness = (1.0 - share) * (0.75 - 0.25 * facing[:, 1]) + share * 1.2 * np.clip(
-            lit, 0.0, 1.0
-        ) ** 1.5
-        light = behind.copy()
-        light[v, u] = colours[which] * (brightness * weave[v, u])[:, None]
+        look = self.photography
+        light = (1.0 - look.shading) * (0.75 - 0.25 * facing[:, 1:2]) * np.ones(3)
+        shine = np.zeros((len(which), 3))
+        where = placed[triangles[which]].mean(axis=1)
+        towards = -where / np.linalg.norm(where, axis=1, keepdims=True)
+        warm = look.tint * np.array([1.0, 0.0, -1.0])
+        for lamp, share, colour in zip(
+            lamps, (1.0 - look.second, look.second), (1.0 + warm, 1.0 - warm), strict=True
+        ):
+            if not share:
+                continue
+            reaching = _reaching(placed, triangles, which, lamp) if look.shadows else np.ones(len(which))
+            lit = 1.2 * np.clip(0.5 + 0.5 * (facing @ lamp), 0.0, 1.0) ** 1.5  # light wraps around cloth
+            strength = look.shading * share * reaching[:, None] * colour
+            light += lit[:, None] * strength
+            half = towards + lamp
+            half /= np.linalg.norm(half, axis=1, keepdims=True) + 1e-9
+            shine += np.clip((facing * half).sum(axis=1), 0.0, 1.0)[:, None] ** _SHARPNESS * strength
+        shown_light = behind.copy()
+        shown_light[v, u] = colours[which] * light * weave[v, u][:, None]
+        if look.gloss:
+            shown_light[v, u] += look.gloss * shine * (which < len(self.pattern.colour))[:, None]
         glove = np.append(self.pattern.colour, np.zeros(len(triangles) - len(self.pattern.colour) + 1))
-        return light, glove.astype(np.uint8)[shown]
+        return shown_light, glove.astype(np.uint8)[shown]
+
+
+def _reaching(placed: np.ndarray, triangles: np.ndarray, which: np.ndarray, lamp: np.ndarray) -> np.ndarray:
+    """(N,) 0 to 1: how much of a far lamp's light reaches triangles ``which``; edges of shadows are soft."""
+    up = np.array([0.0, 1.0, 0.0]) if abs(lamp[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    right = np.cross(up, lamp)
+    right /= np.linalg.norm(right)
+    frame = np.stack([right, np.cross(lamp, right), -lamp])
+    asked = placed[triangles[which]].mean(axis=1) @ frame.T
+    middle = np.append(np.median(asked[:, :2], axis=0), asked[:, 2].mean() - _LAMP_AWAY_MM)
+    seen, asked = placed @ frame.T - middle, asked - middle
+    scale = _LAMP_POINTS / _LAMP_MM
+    points = seen[:, :2] * scale + _LAMP_POINTS / 2
+    _, nearest = z_buffer(points, seen[:, 2], triangles, _LAMP_POINTS, _LAMP_POINTS)
+    is_lit = np.zeros(len(which))
+    places = np.rint(asked[:, :2] * scale + _LAMP_POINTS / 2).astype(int)
+    for step in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
+        u, v = np.clip(places + step, 0, _LAMP_POINTS - 1).T
+        is_lit += asked[:, 2] <= nearest[v, u] + _IN_SHADOW_MM
+    return is_lit / 5.0
 
 
 _ENCODED = encoded_light(np.linspace(0.0, 1.0, 4096))
@@ -302,14 +374,13 @@ def labelled_photographs(
 ) -> list[Photograph]:
     """To learn the glove's colours from, where nobody has labelled real ones.
 
-    Each is of another pose, in another room, with another arm, of slightly different exposure; all in light
-    of ``gains`` (red, green, blue), and with ``inks`` (10, 3) in place of the printed colours.
+    Each is of another pose, in another room and light (``some_light``), with another arm; all seen with
+    ``gains`` (red, green, blue), and with ``inks`` (10, 3) in place of the printed colours.
     """
     rng = np.random.default_rng([seed, 8])
     found = []
     for index, state in enumerate(hand_motion(skin, 2.0 * count, 0.5, seed=seed)[:count]):
-        exposure, arm = float(rng.uniform(0.75, 1.15)), ("skin", "sleeve")[index % 2]
-        look, room = Photography(gains=gains, exposure=exposure, arm=arm), int(rng.integers(2**31))
+        look, room = some_light(rng, ("skin", "sleeve")[index % 2], gains), int(rng.integers(2**31))
         found.append(Photographer(skin, pattern, camera, look, room, inks).photograph(state))
     return found
 

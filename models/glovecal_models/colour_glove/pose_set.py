@@ -17,6 +17,10 @@ from glovecal_models.hand.rotations import FINGERS
 
 PAPER_COUNT = 18_000
 POSE_NOISE_DEG = 5.0
+FREE = 0.35
+"""Share of configurations whose joints go anywhere in their ranges: hands do more than an alphabet has."""
+_DIP_OF_PIP, _DIP_OWN_DEG = 0.6, 8.0
+"""How the last joint goes with the middle one, and the standard deviation of what is its own."""
 _SYNERGY_DEG = 6.0
 _BENDS = {
     "s": (0.0, 0.0, 0.0),  # straight
@@ -53,9 +57,9 @@ def hand_shapes() -> dict[str, np.ndarray]:
     return {name: _angles(*shape) for name, shape in _SHAPES.items()}
 
 
-def generated_poses(count: int = PAPER_COUNT, *, seed: int = 1) -> np.ndarray:
+def generated_poses(count: int = PAPER_COUNT, *, seed: int = 1, free: float = FREE) -> np.ndarray:
     """Configurations (N, 20): shapes mixed finger by finger, partly on the way between two, with correlated
-    and independent noise, within a hand's range."""
+    and independent noise, within a hand's range; a share ``free`` of them has nothing of the shapes."""
     rng = np.random.default_rng(seed)
     shapes = np.array(list(hand_shapes().values()))
     first, second, way = (rng.integers(0, len(shapes), count) for _ in range(3))
@@ -64,7 +68,26 @@ def generated_poses(count: int = PAPER_COUNT, *, seed: int = 1) -> np.ndarray:
     towards = np.where(rng.random(count) < 0.5, rng.random(count), 0.0)[:, None]
     mixed = mixed + towards * (shapes[way] - mixed)
     mixed += _SYNERGY_DEG * rng.normal(size=(count, len(_SYNERGIES))) @ _SYNERGIES
-    return np.clip(mixed + rng.normal(0.0, POSE_NOISE_DEG, mixed.shape), *RANGE_DEG.T)
+    poses = np.clip(mixed + rng.normal(0.0, POSE_NOISE_DEG, mixed.shape), *RANGE_DEG.T)
+    if free:
+        is_free = rng.random(count) < free
+        poses[is_free] = _free_poses(int(is_free.sum()), rng)
+    return poses
+
+
+def _free_poses(count: int, rng: np.random.Generator) -> np.ndarray:
+    """Each finger and joint on its own but for the last joints; bent knuckles leave little room to spread."""
+    low, high = RANGE_DEG.T
+    poses = rng.uniform(low, high, (count, len(FINGER_ROTATIONS)))
+    column = {name: place for place, name in enumerate(FINGER_ROTATIONS)}
+    for finger in "IMRP":
+        last = column[f"{finger}_DIP"]
+        own = _DIP_OF_PIP * poses[:, column[f"{finger}_PIP"]] + rng.normal(0.0, _DIP_OWN_DEG, count)
+        poses[:, last] = np.clip(own, low[last], high[last])
+    for spread, finger in (("IM_ABD", "I"), ("MR_ABD", "R"), ("RP_ABD", "P")):
+        bent = np.clip(poses[:, column[f"{finger}_MCP"]] / 90.0, 0.0, 1.0)
+        poses[:, column[spread]] *= 1.0 - 0.7 * bent
+    return np.clip(poses, low, high)
 
 
 def shape_features(

@@ -10,10 +10,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from glovecal_client.errors import BadName
+from glovecal_client.encryption.kept_file import create_whole, finish_file
+from glovecal_client.errors import BadName, DeviceError
 from glovecal_client.installation import not_installed, packages_of
 from glovecal_client.keys import GloveKeys
 from glovecal_client.operating_system import move_over
+from glovecal_client.pictures.video_file import SUFFIXES, VideoFilePictures, times_path, write_times
 from glovecal_client.private_files import PRIVATE_FOLDER
 from glovecal_models.colour_glove.hand_state import STAGES
 from glovecal_models.errors import BadInput
@@ -46,8 +48,8 @@ class TrackingSettings:
     """Of the subject's hand, as measured; what is missing follows from them, or is assumed."""
     shape: Path | None = None
     """Of the hand in its glove, as ``glovecal camera shape`` finds it; None: by ``sizes_mm``."""
-    clips: int = 36
-    """Rendered ones of other hands, from which the tracker's errors are learned."""
+    mirrored: bool = False
+    """Whether left and right of the pictures are exchanged, as a preview's often are."""
 
     def __post_init__(self) -> None:
         _require("stage", self.stage, STAGES)
@@ -114,8 +116,21 @@ _MADE_BY = {"colours": "glovecal camera colours", "calibrations": "glovecal came
 LARGEST_FILE = 1 << 20
 
 
+@dataclass(frozen=True)
+class KeptVideo:
+    """A video that was imported."""
+
+    name: str
+    file: Path
+    pictures: int
+    seconds: float
+    """From its first picture to its last."""
+    times: str
+    """Where the times of its pictures come from, and how even they are."""
+
+
 class CameraFiles:
-    """Those of one data folder: ``cameras/colours`` and ``cameras/calibrations``."""
+    """Those of one data folder: ``cameras/colours``, ``cameras/calibrations`` and ``cameras/videos``."""
 
     def __init__(self, cameras: Path) -> None:
         self._cameras = cameras
@@ -149,8 +164,60 @@ class CameraFiles:
             unfinished.unlink(missing_ok=True)
         return place
 
+    def videos(self) -> list[KeptVideo]:
+        """By name."""
+        files = sorted((self._cameras / _VIDEOS).glob("*"))
+        return [_described(file) for file in files if file.suffix in SUFFIXES and times_path(file).exists()]
+
+    def video(self, name: str) -> KeptVideo:
+        """Raises NotFound that says which there are."""
+        for each in (known := self.videos()):
+            if each.name == name:
+                return each
+        there_are = ", ".join(each.name for each in known) or "none yet"
+        raise NotFound(
+            f"no video {name!r}; there are: {there_are}. To bring one here: glovecal camera import FILE"
+        )
+
+    def keep_video(self, name: str, file: Path) -> KeptVideo:
+        """A copy of a phone's or a camera's video, in place of one of that name, encrypted where files are,
+        with the times of its pictures beside it. Raises BadInput for a file that is none: nothing is changed
+        then."""
+        suffix = file.suffix.lower()
+        if suffix not in SUFFIXES:
+            raise BadInput(f"{file.name} is no video that can be read: {', '.join(SUFFIXES)}")
+        try:
+            stamps = VideoFilePictures(file).stamps
+        except DeviceError as error:
+            raise BadInput(str(error)) from error
+        place = self._cameras / _VIDEOS / (check_identifier(name, "name") + suffix)
+        place.parent.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
+        unfinished = place.with_name(f".{place.name}.{os.getpid()}")
+        try:
+            with file.open("rb") as source, create_whole(unfinished) as kept:
+                shutil.copyfileobj(source, kept)
+                finish_file(kept)
+            for before in (place.with_suffix(other) for other in SUFFIXES):
+                before.unlink(missing_ok=True)
+            move_over(unfinished, place)
+        finally:
+            unfinished.unlink(missing_ok=True)
+        about = {"video": file.name, "pictures": len(stamps.times_ns), "times": stamps.sentence}
+        place.with_suffix(".json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+        write_times(place, stamps.times_ns)
+        return _described(place)
+
     def _place(self, kind: Kind, name: str) -> Path:
         return self._cameras / kind / (check_identifier(name, "name") + _SUFFIX[kind])
+
+
+_VIDEOS = "videos"
+
+
+def _described(file: Path) -> KeptVideo:
+    stamps = VideoFilePictures(file).stamps
+    first, last = stamps.times_ns[0][0], stamps.times_ns[-1][0]
+    return KeptVideo(file.stem, file, len(stamps.times_ns), (last - first) / 1e9, stamps.sentence)
 
 
 def _check(kind: Kind, file: Path) -> None:

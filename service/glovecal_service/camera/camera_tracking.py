@@ -24,6 +24,7 @@ from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES, PoseEstimate
+from glovecal_models.colour_glove.pose.both_ways import Follows
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.hand.skeleton import skeleton_document
 from glovecal_models.names import did_you_mean
@@ -31,7 +32,8 @@ from glovecal_service.camera.camera_link import HAND, NO_HAND, CameraAnswers, Ca
 from glovecal_service.camera.camera_settings import CameraSettings
 from glovecal_service.camera.drawn_view import SeenPicture, drawn_view
 from glovecal_service.camera.picture_reader import KeptPictures, NewestPicture, NumberedPicture, PictureReader
-from glovecal_service.camera.tracking_setup import CameraLight, Tracker, TrackingSetup, tracking_setup
+from glovecal_service.camera.tracking_setup import CameraLight, TrackingSetup, tracking_setup
+from glovecal_service.jobs.time_left import TimeLeft
 from glovecal_service.plain import reason_of
 
 TURN_S = 0.1
@@ -86,13 +88,14 @@ class CameraTracking:
         self._stage = settings.stage
         self._setup: TrackingSetup | None = None
         self._source: PictureSource | None = None
-        self._tracker: Tracker | None = None
+        self._tracker: Follows | None = None
         self._reader: PictureReader | None = None
         self._seen: SeenPicture | None = None
         self._light = CameraLight()
         self._last: Pose | None = None
         self._last_s = self._stale_s = self._status_s = self._checked_s = 0.0
         self._no_pose = 0
+        self._preparing, self._percent = TimeLeft(0.0), -1
 
     def run(self, stop: threading.Event, source: PictureSource | None = None) -> CameraSummary:
         """``source``: in place of the one that the settings name. Raises BadInput, DeviceError,
@@ -158,7 +161,7 @@ class CameraTracking:
         began = time.perf_counter()
         pixels, tracker = taken.picture.pixels, self._tracker
         try:
-            self._check_size(pixels)
+            pixels = self._setup.seen(pixels)
             labels = self._light.labels(pixels, self._setup)
             self._kept.keep_labels(labels, self._source, taken.picture.monotonic_ns, taken.picture.wall_ns)
             self._check(pixels, labels)
@@ -188,15 +191,6 @@ class CameraTracking:
         self._checked_s = now
         found = self._setup.check.findings(pixels, labels)
         self.health.note_findings({each.kind: each.sentence for each in found})
-
-    def _check_size(self, pixels: np.ndarray) -> None:
-        assert self._setup is not None
-        camera = self._setup.cameras[0]
-        if pixels.shape[:2] != (camera.height, camera.width):
-            raise BadInput(
-                f"the picture is {pixels.shape[1]} x {pixels.shape[0]}, the camera is calibrated for "
-                f"{camera.width} x {camera.height}: calibrate it at this size"
-            )
 
     def _publish(self, taken: NumberedPicture, estimate: PoseEstimate) -> float:
         """Latency in milliseconds, from the picture's stamp until the pose was handed to the network."""
@@ -266,7 +260,12 @@ class CameraTracking:
         return drawn_view(seen, setup.hand, setup.cameras[0], asked)
 
     def _say_progress(self, sentence: str, fraction: float) -> None:
-        self._change("opening", f"{sentence}, {100 * fraction:.0f} %")
+        percent = round(100 * fraction)
+        if percent == self._percent:
+            return
+        self._percent, seconds = percent, self._preparing.seconds(fraction)
+        left = "" if seconds is None else f", about {max(1, round(seconds))} s left"
+        self._change("opening", f"{sentence}, {percent} %{left}")
 
     def _change(self, state: str, sentence: str) -> None:
         if self._status.change(state, sentence):  # type: ignore[arg-type]

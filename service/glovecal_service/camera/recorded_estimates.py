@@ -18,9 +18,10 @@ from glovecal_client.errors import DeviceFinished, DeviceLost
 from glovecal_client.pictures.label_file import SUFFIX as LABELS
 from glovecal_client.pictures.label_file import LabelFilePictures, read_label_times
 from glovecal_client.pictures.source import Picture, PictureSource
-from glovecal_client.pictures.video_file import SUFFIX as VIDEO
-from glovecal_client.pictures.video_file import VideoFilePictures, read_times
+from glovecal_client.pictures.video_file import OF_COMPUTER, VideoFilePictures
+from glovecal_client.pictures.video_file import SUFFIXES as VIDEOS
 from glovecal_models.colour_glove.hand_state import PoseEstimate, camera_estimates
+from glovecal_models.colour_glove.pose.both_ways import Follows, followed_both_ways
 from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -50,6 +51,8 @@ class RecordingCount:
     """How its end was met; empty where it is whole."""
     rate_hz: float
     """Of its frames, from the median of their intervals."""
+    times: str
+    """Where its frames' times come from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ class Recordings:
         if len({file.resolve() for file in files}) < len(files):
             raise BadInput(f"{files[0]} is named twice; two cameras have a recording each")
         self.sources = tuple(_source(file) for file in files)
-        self.times_s = tuple(_times_s(file) for file in files)
+        self.times_s = tuple(_times_s(source, file) for source, file in zip(self.sources, files, strict=True))
         if len(files) > 1:
             _require_one_clock(files, self.sources)
         later = [np.flatnonzero(without_repeats(times)) for times in self.times_s]
@@ -100,31 +103,38 @@ class Recordings:
     def tracked(
         self, setup: TrackingSetup, stage: str, report: Report | None = None, cancelled: Cancel | None = None
     ) -> TrackedRecordings:
-        """All of them, one after another. Raises BadInput where nothing can be read, Cancelled."""
-        began, tracker, wanted = time.perf_counter(), setup.tracker(stage), len(self.rows[0])
+        """All of them, followed forwards and backwards. Raises BadInput where nothing can be read,
+        Cancelled."""
+        began, wanted = time.perf_counter(), len(self.rows[0])
+        forwards, backwards = _Way(setup.tracker(stage)), _Way(setup.tracker(stage))
         poses: list[PoseEstimate | None] = []
-        unusable, problem, found, present = 0, "", Counter[str](), ()
-        checked_s = -np.inf
+        found, views = Counter[str](), list[tuple[str, ...]]()
         at_s = np.mean([times[rows] for times, rows in zip(self.times_s, self.rows, strict=True)], axis=0)
         readers = [_Reader(source, rows) for source, rows in zip(self.sources, self.rows, strict=True)]
-        try:
+
+        def moments() -> Iterator[tuple[Sequence[np.ndarray], float]]:
+            checked_s, present = -np.inf, ()
             for frame, pictures in enumerate(zip(*readers, strict=False)):
                 stop_if(cancelled, "tracking the recording")
+                labels: list[np.ndarray] = []
                 try:
-                    labels = [
-                        pixels if pixels.ndim == 2 else setup.colours.labels(pixels) for pixels in pictures
-                    ]
+                    seen = [setup.seen(pixels, number) for number, pixels in enumerate(pictures)]
+                    labels = [setup.labels(each) for each in seen]
                     if at_s[frame] - checked_s >= CHECK_EVERY_S:
-                        checked_s, present = at_s[frame], _findings(setup, pictures, labels)
-                    pose = tracker.track(labels, float(at_s[frame]))
-                except (BadInput, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-                    unusable, problem, pose = unusable + 1, reason_of(error), None
+                        checked_s, present = at_s[frame], _findings(setup, seen, labels)
+                except UNUSABLE as error:
+                    forwards.note(float(at_s[frame]), error)
+                views.append(present)
+                if report is not None:
+                    report(f"tracking: frame {frame + 1} of {wanted}", (frame + 1) / wanted)
+                yield labels, float(at_s[frame])
+
+        try:
+            for pose, present in zip(followed_both_ways(forwards, backwards, moments()), views, strict=False):
                 found.update(present)
                 if pose is not None and present:
                     pose = replace(pose, accepted=np.zeros_like(pose.accepted))
                 poses.append(pose)
-                if report is not None:
-                    report(f"tracking: frame {frame + 1} of {wanted}", (frame + 1) / wanted)
             for reader in readers:
                 reader.finish()
         finally:
@@ -132,10 +142,11 @@ class Recordings:
                 source.close()
         if not poses:
             raise BadInput(f"no frame can be read: {'; '.join(reader.ended for reader in readers)}")
+        unusable = len(forwards.unusable)
         return TrackedRecordings(
             camera_estimates(at_s[: len(poses)], poses, simulated=any(s.simulated for s in self.sources)),
             tuple(self._count(number, len(poses), reader.ended) for number, reader in enumerate(readers)),
-            sum(pose is None for pose in poses) - unusable, unusable, problem,
+            sum(pose is None for pose in poses) - unusable, unusable, forwards.problem,
             sum(pose is not None and not pose.accepted.any() for pose in poses),
             dict(found), time.perf_counter() - began,
         )  # fmt: skip
@@ -148,7 +159,7 @@ class Recordings:
         ]
         try:
             return [
-                [pixels if pixels.ndim == 2 else setup.colours.labels(pixels) for pixels in pictures]
+                [setup.labels(setup.seen(pixels, number)) for number, pixels in enumerate(pictures)]
                 for pictures in zip(*readers, strict=False)
             ]
         finally:
@@ -161,6 +172,7 @@ class Recordings:
         return RecordingCount(
             self.sources[number].name.partition(":")[2], len(times), len(times) - self._usable[number],
             self._usable[number] - matched_frames, matched_frames - tracked, ended, 1.0 / _interval_s(times),
+            _whose_times(self.sources[number]),
         )  # fmt: skip
 
 
@@ -189,6 +201,35 @@ def _interval_s(times: np.ndarray) -> float:
     """Usual time between frames; that of 30 a second where there is but one frame."""
     steps = np.diff(times)
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0 / 30.0
+
+
+UNUSABLE = (BadInput, ArithmeticError, ValueError, np.linalg.LinAlgError)
+"""What a picture may be refused with."""
+
+
+class _Way:
+    """A tracker that goes on after a picture that it cannot use."""
+
+    def __init__(self, tracker: Follows) -> None:
+        self.unusable: set[float] = set()
+        self.problem = ""
+        self._tracker = tracker
+
+    def track(self, label_images: Sequence[np.ndarray], seconds: float) -> PoseEstimate | None:
+        if not label_images:
+            return None
+        try:
+            return self._tracker.track(label_images, seconds)
+        except UNUSABLE as error:
+            self.note(seconds, error)
+        return None
+
+    def forget(self) -> None:
+        self._tracker.forget()
+
+    def note(self, seconds: float, error: Exception) -> None:
+        self.unusable.add(seconds)
+        self.problem = reason_of(error)
 
 
 class _Reader:
@@ -240,19 +281,23 @@ def _findings(
 
 
 def _source(file: Path) -> VideoFilePictures | LabelFilePictures:
-    if file.suffix == VIDEO:
+    if file.suffix.lower() in VIDEOS:
         return VideoFilePictures(file)
     if file.suffix == LABELS:
         return LabelFilePictures(file)
     raise BadInput(
-        f"{file} is no recording of Glovecal: a video ends in {VIDEO} and has its times beside it, a file of "
-        f"label images ends in {LABELS}"
+        f"{file} is no recording of a camera: a video ends in {', '.join(VIDEOS)}, a file of label images in "
+        f"{LABELS}"
     )
 
 
-def _times_s(file: Path) -> np.ndarray:
-    stamps = read_times(file) if file.suffix == VIDEO else read_label_times(file)
+def _times_s(source: VideoFilePictures | LabelFilePictures, file: Path) -> np.ndarray:
+    stamps = source.stamps.times_ns if isinstance(source, VideoFilePictures) else read_label_times(file)
     return np.array([monotonic_ns for monotonic_ns, _ in stamps], dtype=float) / 1e9
+
+
+def _whose_times(source: VideoFilePictures | LabelFilePictures) -> str:
+    return source.stamps.sentence if isinstance(source, VideoFilePictures) else OF_COMPUTER
 
 
 def _require_one_clock(
@@ -260,7 +305,12 @@ def _require_one_clock(
 ) -> None:
     """Times of two computers' clocks cannot be matched."""
     computers = []
-    for source in sources:
+    for file, source in zip(files, sources, strict=True):
+        if isinstance(source, VideoFilePictures) and not source.stamps.of_this_computer:
+            raise BadInput(
+                f"{file.name} has no times of a computer's clock, so its frames cannot be matched with "
+                "those of another camera: record both cameras with Glovecal on one computer"
+            )
         source.open()
         computers.append(source.about.get("computer"))
         source.close()

@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -25,20 +24,18 @@ from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.label_file import LabelFilePictures
 from glovecal_client.pictures.source import PictureSource, RenderedPictures, build_source
 from glovecal_models.colour_glove.camera_model import Camera, read_cameras
-from glovecal_models.colour_glove.hand_state import HandState, PoseEstimate
+from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.pattern import COLOURS, Pattern, printed_pattern
-from glovecal_models.colour_glove.photograph import Photographer, Photography, labelled_photographs
-from glovecal_models.colour_glove.pictures.classify import ColourTable
+from glovecal_models.colour_glove.photograph import (
+    Photographer,
+    Photography,
+)
+from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_colours
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
 from glovecal_models.colour_glove.pictures.white_balance import CardColours, Gains, blind_gains
-from glovecal_models.colour_glove.pose.error_learning import (
-    PEOPLE,
-    ShapeSpread,
-    drawn_colours,
-    prepared_tracker,
-)
+from glovecal_models.colour_glove.pose.both_ways import Follows
 from glovecal_models.colour_glove.pose.hand_shape_fit import read_shape
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import hand_shapes
 from glovecal_models.colour_glove.rasterise import rasterise
@@ -63,8 +60,7 @@ def drawn_table(
     inks, gains = None, (1.0, 1.0, 1.0)
     if card is not None:
         inks, gains = card.inks, (1.0 / card.gains.red, 1.0 / card.gains.green, 1.0 / card.gains.blue)
-    photographs = labelled_photographs(skin, pattern, Camera(), inks=inks, gains=gains)
-    return ColourTable.trained([each.picture for each in photographs], [each.labels for each in photographs])
+    return drawn_colours(skin, pattern, inks=inks, gains=gains)
 
 
 def labelled_table(files: Sequence[Path]) -> ColourTable:
@@ -108,12 +104,8 @@ def _read(file: Path, how: int) -> np.ndarray | None:
 
 
 ASSUMED = Camera()
-LEARNED = 1
-"""Grows when the table learned from rendered photographs is to be learned anew."""
-
-
-class Tracker(Protocol):
-    def track(self, label_images: Sequence[np.ndarray], seconds: float) -> PoseEstimate | None: ...
+LEARNED = 2
+"""Grows when what is learned from drawn photographs, colours and errors, is learned anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +116,9 @@ class TrackingSetup:
     """Not open."""
     hand: PrintedHand
     cameras: tuple[Camera, ...]
-    """One for each source."""
+    """One for each source, at the size at which its pictures are looked at."""
+    sizes: tuple[tuple[int, int], ...]
+    """Width and height of each source's pictures as they come."""
     is_calibrated: bool
     """Whether focal length and distortion are known, not assumed."""
     colours: ColourTable
@@ -132,8 +126,28 @@ class TrackingSetup:
     first: HandTracker
     """Of which other stages take database and errors."""
     made_from: str
+    mirrored: bool = False
+    """Whether left and right of the pictures are exchanged, and are put back."""
 
-    def tracker(self, stage: str) -> Tracker:
+    def seen(self, pixels: np.ndarray, number: int = 0) -> np.ndarray:
+        """A picture (H, W, 3), or labels (H, W), of source ``number`` as it is looked at. Raises BadInput for
+        another size than its camera's."""
+        size = pixels.shape[1], pixels.shape[0]
+        if size != self.sizes[number]:
+            width, height = self.sizes[number]
+            raise BadInput(
+                f"the picture is {size[0]} x {size[1]}, the camera is calibrated for {width} x {height}: "
+                "calibrate it at this size"
+            )
+        return at_working_size(
+            pixels, mirrored=self.mirrored and pixels.ndim == 3
+        )  # kept labels were put back
+
+    def labels(self, seen: np.ndarray) -> np.ndarray:
+        """(H, W) of what ``seen`` gave; what is labels already comes back as it is."""
+        return seen if seen.ndim == 2 else self.colours.labels(seen)
+
+    def tracker(self, stage: str) -> Follows:
         """A new one, which has seen nothing yet. Raises BadInput for an unknown stage."""
         first = self.first
         return HandTracker(first.hand, first.lookup, first.cameras, first.errors, stage=stage)
@@ -159,72 +173,121 @@ def tracking_setup(
 
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
-    skin, spread = _skin(settings)
-    hand = PrintedHand(skin, printed_pattern())
+    hand = PrintedHand(_skin(settings), printed_pattern())
     built = tuple(
         camera_source(source, lambda: RenderedGlove(hand, ASSUMED)) if isinstance(source, str) else source
         for source in sources
     )
-    cameras = _cameras(settings, built)
+    sizes = [_size(source) for source in built]
+    cameras = _cameras(settings, built, sizes)
     first = prepared_tracker(
-        settings.folder, cameras, hand=hand, spread=spread,
-        entries=settings.entries, clips=settings.clips, report=report, cancelled=cancelled,
+        settings.folder, cameras, hand=hand,
+        entries=settings.entries, report=report, cancelled=cancelled,
     )  # fmt: skip
-    made_from = repr((first.lookup.database.folder.name, cameras, spread, settings.clips))
+    made_from = repr((first.lookup.database.folder.name, cameras, LEARNED))
     check = PictureCheck(first.lookup)
     _ = check.distance_limit_px2  # takes a moment: not while pictures wait
     is_known = settings.calibration is not None or built[0].name == RENDERED
     colours = settings.colours
     table = glove_colours(settings.folder, hand) if colours is None else ColourTable.load(colours)
-    return TrackingSetup(built, hand, cameras, is_known, table, check, first, made_from)
+    return TrackingSetup(
+        built, hand, cameras, tuple(sizes), is_known, table, check, first, made_from, settings.mirrored
+    )
 
 
-def _skin(settings: TrackingSettings) -> tuple[HandSkin, ShapeSpread]:
-    """The hand to be tracked, and how far the one that is seen may be from it."""
+def prepared(
+    settings: TrackingSettings, report: Report | None = None, cancelled: Cancel | None = None
+) -> Path:
+    """Build what ``tracking_setup`` needs besides pictures, where it is not there yet; the folder it is in.
+
+    Raises BadInput, Cancelled."""
+    hand = PrintedHand(_skin(settings), printed_pattern())
+    prepared_tracker(settings.folder, hand=hand, entries=settings.entries, report=report, cancelled=cancelled)
+    glove_colours(settings.folder, hand)
+    return settings.folder
+
+
+def _skin(settings: TrackingSettings) -> HandSkin:
+    """The hand to be tracked."""
     if settings.shape is None:
         sizes = HandDimensions.from_measured(settings.sizes_mm)
-        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right")), PEOPLE
+        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
     shape = read_shape(settings.shape)
     if shape.hand != settings.hand:
         raise BadInput(f"{settings.shape} is of a {shape.hand} hand; the {settings.hand} one wears the glove")
-    return shape.skin(), ShapeSpread.after_fit(shape.size_sd, shape.bones_sd.values())
+    return shape.skin()
 
 
 def _size(source: PictureSource) -> tuple[int, int]:
-    """Height and width of its pictures."""
+    """Width and height of its pictures."""
     source.open()
     try:
         height, width = source.read().pixels.shape[:2]
-        return height, width
+        return width, height
     finally:
         source.close()
 
 
-def _cameras(settings: TrackingSettings, sources: Sequence[PictureSource]) -> tuple[Camera, ...]:
-    """The calibrated ones, else the view of the assumed camera in a picture of this size."""
-    sizes = [_size(source) for source in sources]
+LONGEST_SIDE_PX = 640
+"""Larger pictures are averaged down, with their camera: the filter, the joining of areas, the least glove
+count pixels, and were set at 640 x 480; a window around a hand has 192 x 192 points."""
+
+
+def working_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height at which a picture of this size is looked at."""
+    share = min(1.0, LONGEST_SIDE_PX / max(width, height))
+    return max(1, round(width * share)), max(1, round(height * share))
+
+
+def at_working_size(pixels: np.ndarray, *, mirrored: bool = False) -> np.ndarray:
+    """A picture (H, W, 3), each pixel the mean of what it covers, or labels (H, W), where it is larger.
+
+    ``mirrored``: left and right were exchanged and are put back.
+    """
+    height, width = pixels.shape[:2]
+    size = working_size(width, height)
+    if size != (width, height):
+        how = cv2.INTER_AREA if pixels.ndim == 3 else cv2.INTER_NEAREST_EXACT
+        pixels = cv2.resize(pixels, size, interpolation=how)
+    return np.ascontiguousarray(pixels[:, ::-1]) if mirrored else pixels
+
+
+def assumed_camera(width: int, height: int) -> Camera:
+    """The view of the camera assumed along the longer side of a picture of this size."""
+    focal = ASSUMED.focal_px[0] * max(width, height) / ASSUMED.width
+    return Camera(width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2))
+
+
+def _cameras(
+    settings: TrackingSettings, sources: Sequence[PictureSource], sizes: Sequence[tuple[int, int]]
+) -> tuple[Camera, ...]:
+    """The calibrated ones, else the one assumed, at the size at which pictures are looked at."""
     if settings.calibration is None:
         if len(sizes) > 1:
             raise BadInput(
                 "two cameras are tracked together only with their calibration; "
                 "glovecal camera calibrate --second tells where the second one stands"
             )
-        height, width = sizes[0]
-        focal = ASSUMED.focal_px[0] * width / ASSUMED.width
-        return (Camera(width, height, (focal, focal), ((width - 1) / 2, (height - 1) / 2)),)
+        return (assumed_camera(*working_size(*sizes[0])),)
     cameras = read_cameras(settings.calibration)
     if len(cameras) < len(sources):
         raise BadInput(
             f"{settings.calibration} holds {len(cameras)} camera, {len(sources)} are to be tracked; "
             "glovecal camera calibrate --second calibrates both"
         )
-    for camera, source, (height, width) in zip(cameras, sources, sizes, strict=False):
-        if (camera.width, camera.height) != (width, height):
+    found = []
+    for camera, source, size in zip(cameras, sources, sizes, strict=False):
+        looked_at = working_size(camera.width, camera.height)
+        # Labels were kept at the size at which the pictures were looked at.
+        if size != (camera.width, camera.height) and not (
+            isinstance(source, LabelFilePictures) and size == looked_at
+        ):
             raise BadInput(
                 f"{settings.calibration} is of {camera.width} x {camera.height}, but {source.name} "
-                f"gives {width} x {height}: calibrate it at this size"
+                f"gives {size[0]} x {size[1]}: calibrate it at this size"
             )
-    return cameras[: len(sources)]
+        found.append(camera.resized(*looked_at))
+    return tuple(found)
 
 
 def glove_colours(folder: Path, hand: PrintedHand) -> ColourTable:
@@ -346,5 +409,8 @@ class CameraLight:
         Raises BadInput.
         """
         gains, distance, before = blind_gains(list(self._of_glove), setup.colours, setup.first.lookup)
-        self.gains, self._in_this_light = gains, None if own_colours else drawn_colours(setup.hand, gains)
+        self.gains, self._in_this_light = gains, None
+        if not own_colours:
+            cast = (1.0 / gains.red, 1.0 / gains.green, 1.0 / gains.blue)
+            self._in_this_light = drawn_colours(setup.hand.skin, setup.hand.pattern, gains=cast)
         return {**asdict(gains), "distance_px2": distance, "distance_before_px2": before}

@@ -14,13 +14,22 @@ from glovecal_client.encryption.key_file import KEY_FILE, MADE_BY, settle_encryp
 from glovecal_client.errors import BadEncryptionKey, CaptureRefused, ClientError, DamagedLog, reason_of
 from glovecal_client.frame_log import cut_damaged_tail
 from glovecal_client.keys import GloveKeys
+from glovecal_client.pictures.video_file import SUFFIXES
 from glovecal_service.settings import Settings
 from glovecal_service.store.blobs import require_room
 from glovecal_service.store.data_folder_lock import DataFolderLock
 
 CAPTURE = ("capture", "simulated-glove/capture")
 """Folders with a folder each site, and in it each glove."""
-LOGS, GROWING, WHOLE = (".glvlog", ".glog"), (".mkv", ".labels", ".cut"), (".zip", ".safetensors")
+LOGS, GROWING, WHOLE = (
+    (".glvlog", ".glog"),
+    (".mkv", ".labels", ".cut"),
+    (
+        ".zip",
+        ".safetensors",
+        *SUFFIXES[1:],
+    ),
+)
 _SHA256 = re.compile(r"[0-9a-f]{64}\Z")
 
 
@@ -50,7 +59,7 @@ def encrypt_folder(settings: Settings, report: Callable[[Path], None] = lambda f
         folders = (
             settings.recordings_folder, settings.uploads_folder, settings.videos_folder,
             settings.films_folder, settings.fits_folder, settings.artifacts_folder,
-            data / "cameras" / "kept",
+            data / "cameras" / "kept", data / "cameras" / "videos",
         )  # fmt: skip
         for folder in folders:
             _encrypt(folder, done, report)

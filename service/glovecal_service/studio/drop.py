@@ -1,4 +1,5 @@
-"""Files dropped on any page: what they are is shown on the page Takes; models are imported at once."""
+"""Files dropped on any page: what they are is shown on the page Takes; models and videos are imported at
+once."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ from urllib.parse import quote, unquote
 
 from nicegui import events, ui
 
-from glovecal_service.plain import read
+from glovecal_service.plain import read, video_name
+from glovecal_service.rest.glove.answer import CameraVideo
 from glovecal_service.rest.model.answer import ImportedModel
 from glovecal_service.rest.take.answer import UploadedFile, UploadKind
 from glovecal_service.studio.chosen import Chosen
@@ -67,13 +69,18 @@ class DropZone:
         self._field.reset()
         service = self._studio.service
         sent: list[Uploaded] = []
+        videos: list[Uploaded] = []
         kinds: list[str] = []
         for file in event.files:
             with refusals(partial(_warn_of, file.name)):
                 answer = await service.post_file("/uploads", await file.read(), KEPT_AS)
                 kept = read(UploadedFile, answer)
-                kinds.append((await service.read(UploadKind, f"/uploads/{kept.sha256}/kind")).kind)
-                sent.append((kept.sha256, file.name))
+                kind = (await service.read(UploadKind, f"/uploads/{kept.sha256}/kind")).kind
+                if kind == "video":
+                    videos.append((kept.sha256, file.name))
+                else:
+                    kinds.append(kind)
+                    sent.append((kept.sha256, file.name))
         if set(kinds) == {"model"}:
             for file in sent:
                 with refusals(partial(_warn_of, file[1])):
@@ -82,6 +89,21 @@ class DropZone:
         elif sent:
             files = list(dict.fromkeys([*self.waiting, *sent]))
             ui.navigate.to(self._about.address("takes", files=written(files)))
+        await self._import_videos(videos, then_shown=not sent)
+
+    async def _import_videos(self, files: Sequence[Uploaded], *, then_shown: bool) -> None:
+        """The page Cameras plays them; it opens for a single one."""
+        for sha, filename in files:
+            with refusals(partial(_warn_of, filename)):
+                name = video_name(filename)
+                body = {"upload": sha, "filename": filename}
+                kept = read(CameraVideo, await self._studio.service.put(f"/camera-files/videos/{name}", body))
+                ui.notify(
+                    f"Video {kept.name}: {kept.pictures} pictures in {kept.seconds:.1f} s; {kept.times}.",
+                    timeout=10_000,
+                )
+                if len(files) == 1 and then_shown:
+                    ui.navigate.to(self._about.address("cameras", video=kept.name))
 
 
 def _warn_of(name: str, refusal: str) -> None:

@@ -4,21 +4,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from error_learning import learned_errors
+from other_gloves import displaced, other_hand
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import PoseDatabase
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.photograph import hand_motion
-from glovecal_models.colour_glove.pose.error_learning import (
-    PEOPLE,
-    ShapeSpread,
-    errors_file,
-    learned_errors,
-    other_hand,
-    spoilt,
+from glovecal_models.colour_glove.pose.both_ways import AHEAD, AT_ONCE, followed_both_ways
+from glovecal_models.colour_glove.pose.hand_tracker import (
+    EVIDENCE,
+    HandTracker,
+    LearnedErrors,
+    fitted_scale,
+    scale_name,
+    shipped_errors,
 )
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, LearnedErrors, fitted_scale
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
@@ -26,12 +28,12 @@ from glovecal_models.errors import BadInput, Cancelled
 
 SKIN = hand_skin()
 HAND = PrintedHand(SKIN, glove_pattern(SKIN))
-AHEAD = np.array([0.0, 0.0, 470.0])
+MEETING = np.array([0.0, 0.0, 470.0])
 _SIDEWAYS = np.array([[0.5, 0.0, -0.866], [0.0, 1.0, 0.0], [0.866, 0.0, 0.5]])
 _TURN = np.linalg.svd(_SIDEWAYS)[0] @ np.linalg.svd(_SIDEWAYS)[2]
 CAMERAS = (
     Camera(),
-    Camera(rotation=tuple(map(tuple, _TURN)), translation_mm=tuple(AHEAD - _TURN @ AHEAD)),
+    Camera(rotation=tuple(map(tuple, _TURN)), translation_mm=tuple(MEETING - _TURN @ MEETING)),
 )
 EMPTY = np.zeros((480, 640), np.uint8)
 
@@ -42,8 +44,21 @@ def lookup(database: PoseDatabase) -> PoseLookup:
 
 
 @pytest.fixture(scope="module")
-def errors(lookup: PoseLookup) -> LearnedErrors:
-    return learned_errors(HAND, lookup, CAMERAS[:1], clips=3, workers=1)
+def errors() -> LearnedErrors:
+    return shipped_errors(1, "right")
+
+
+def spoilt(labels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """With some pixels wrong and some clutter, as from a classifier."""
+    found, glove = labels.copy(), labels > 0
+    wrong = glove & (rng.random(labels.shape) < 0.04)
+    count = int(wrong.sum())
+    found[wrong] = np.where(rng.random(count) < 0.7, 0, rng.integers(1, 11, count))
+    for _ in range(3):
+        v, u, size = rng.integers(0, labels.shape[0]), rng.integers(0, labels.shape[1]), rng.integers(1, 6)
+        blob = found[v : v + size, u : u + size]
+        blob[blob == 0] = rng.integers(1, 11)
+    return found
 
 
 def pictures(skin: HandSkin, state, rng: np.random.Generator) -> list[np.ndarray]:
@@ -139,41 +154,78 @@ def test_following_steadies_and_a_gap_is_forgotten(lookup, errors):
     assert np.array_equal(first.state.vector(), later.state.vector())
 
 
-def test_learned_errors_are_kept_and_wrong_files_refused(errors: LearnedErrors, tmp_path: Path, lookup):
-    errors.save(tmp_path / "errors.npz")
-    again = LearnedErrors.load(tmp_path / "errors.npz")
-    assert np.array_equal(again.blend_covariance, errors.blend_covariance)
-    assert all(np.array_equal(again.scales[name], scale) for name, scale in errors.scales.items())
-    assert learned_errors(HAND, lookup, CAMERAS[:1], clips=3, workers=1).speed == pytest.approx(errors.speed)
+def test_errors_are_learned_and_wrong_files_refused(lookup: PoseLookup, tmp_path: Path) -> None:
+    found = learned_errors(HAND, lookup, 1, clips=3, workers=1)
+    arrays = {f"these: {name}": array for name, array in found.arrays().items()}
+    np.savez(tmp_path / "errors.npz", allow_pickle=False, **arrays)
+    again = LearnedErrors.load(tmp_path / "errors.npz", "these: ")
+    assert np.array_equal(again.blend_covariance, found.blend_covariance)
+    assert all(np.array_equal(again.scales[name], scale) for name, scale in found.scales.items())
     (tmp_path / "half.npz").write_bytes((tmp_path / "errors.npz").read_bytes()[:500])
     (tmp_path / "words.npz").write_text("no numbers")
-    for name in ("half.npz", "words.npz"):
+    for name in ("half.npz", "words.npz", "errors.npz"):
         with pytest.raises(BadInput, match="holds no errors"):
             LearnedErrors.load(tmp_path / name)
+    evidence = np.zeros((26, len(EVIDENCE)))
     with pytest.raises(BadInput, match="were never learned"):
-        LearnedErrors(errors.blend_covariance, errors.speed, {}).deviation("ik", False, np.ones(26), 0.1)
+        LearnedErrors(found.blend_covariance, found.speed, {}).deviation("ik", False, evidence)
     with pytest.raises(Cancelled):
-        learned_errors(HAND, lookup, CAMERAS, clips=5, workers=1, cancelled=lambda: True)
+        learned_errors(HAND, lookup, 1, clips=5, workers=1, cancelled=lambda: True)
 
 
-def test_a_fitted_shape_has_errors_of_its_own(lookup):
-    """Its bones are better known than people's; radii gain as much, the size counts apart."""
-    left = ShapeSpread.after_fit(0.004, [0.011, 0.016])
-    assert left.bones == pytest.approx(np.sqrt(np.mean([0.011**2, 0.016**2]) - 0.004**2))
-    assert left.radii / left.bones == pytest.approx(PEOPLE.radii / PEOPLE.bones)
-    assert left.overall == 0.004
-    assert ShapeSpread.after_fit(0.05, [0.049]).bones == 0.0
-    usual = errors_file(HAND, lookup, CAMERAS, 3)
-    assert (
-        errors_file(HAND, lookup, CAMERAS, 3, left) != usual == errors_file(HAND, lookup, CAMERAS, 3, PEOPLE)
-    )
+@pytest.mark.parametrize("cameras", [1, 2, 3])
+def test_what_was_learned_comes_with_the_package(cameras: int) -> None:
+    right, left = (shipped_errors(cameras, hand) for hand in ("right", "left"))
+    assert set(right.scales) >= {scale_name("dense", True), "nearest", "blend"}
+    assert np.linalg.eigvalsh(right.blend_covariance).min() > 0.0
+    assert np.array_equal(np.diag(left.blend_covariance), np.diag(right.blend_covariance))
+    mirrored = left.blend_covariance[:20, 21]
+    assert np.array_equal(mirrored, -right.blend_covariance[:20, 21])
 
 
-def test_a_scale_is_found_again():
+def test_a_scale_is_found_again() -> None:
+    """95 of 100 errors lie within the deviations, whatever goes along with them."""
     rng = np.random.default_rng(3)
-    posterior, share = rng.lognormal(0.5, 0.6, (4000, 26)), rng.uniform(0.05, 0.6, 4000)
-    true = np.array([1.0, 0.8, 0.5])
-    sd = np.exp(true[0] + true[1] * np.log(posterior) + true[2] * np.log(share + 0.02)[:, None])
-    assert np.allclose(fitted_scale(sd * rng.normal(size=sd.shape), posterior, share), true, atol=0.15)
+    evidence = np.concatenate([np.ones((6000, 26, 1)), rng.normal(0.0, 0.7, (6000, 26, 5))], axis=2)
+    true = np.array([1.0, 0.8, 0.5, 0.3, 0.0, -0.2])
+    errors = np.exp(evidence @ true) * rng.normal(size=(6000, 26))
+    found = fitted_scale(errors[:4000], evidence[:4000])
+    assert np.allclose(found, true, atol=0.25)
+    sd = np.exp((found * evidence[4000:]).sum(axis=2))
+    assert (np.abs(errors[4000:]) <= 1.96 * sd).mean() == pytest.approx(0.955, abs=0.015)
     with pytest.raises(BadInput, match="at least 30"):
-        fitted_scale(np.ones((5, 26)), np.ones((5, 26)), np.ones(5))
+        fitted_scale(np.ones((5, 26)), np.ones((5, 26, 6)))
+
+
+def test_followed_both_ways_knows_no_direction_of_time(lookup, errors) -> None:
+    """A film shown backwards gives the same poses backwards: neither trails."""
+    skin, rng = other_hand(SKIN, 90), np.random.default_rng(91)
+    clip = [pictures(skin, state, rng)[:1] for state in hand_motion(skin, 0.8, 30.0, seed=92)]
+
+    def followed(views) -> list:
+        ways = [HandTracker(HAND, lookup, CAMERAS[:1], errors, stage="ik") for _ in range(2)]
+        moments = [(view, index / 30.0) for index, view in enumerate(views)]
+        return list(followed_both_ways(ways[0], ways[1], moments))
+
+    once, reversed_film = followed(clip), followed(clip[::-1])
+    for pose, other in zip(once, reversed(reversed_film), strict=True):
+        assert np.allclose(pose.state.angles_deg, other.state.angles_deg, atol=1e-6)
+        assert np.allclose(pose.standard_deviation, other.standard_deviation, atol=1e-2)
+
+
+def test_every_picture_has_its_pose_in_its_place(lookup, errors) -> None:
+    """Over the ends of what is held at a time, and where a picture shows nothing."""
+    state = hand_motion(SKIN, 1.0, 1.0, seed=5)[0]
+    view, count, empty = pictures(SKIN, state, np.random.default_rng(1))[:1], 2 * AT_ONCE + AHEAD + 3, 40
+    ways = [HandTracker(HAND, lookup, CAMERAS[:1], errors, stage="blend") for _ in range(2)]
+    moments = (([EMPTY] if index == empty else view, index / 30.0) for index in range(count))
+    poses = list(followed_both_ways(ways[0], ways[1], moments))
+    assert [pose is None for pose in poses] == [index == empty for index in range(count)]
+
+
+def test_a_displaced_pattern_is_the_printed_one_moved() -> None:
+    moved = [displaced(SKIN, HAND.pattern, seed) for seed in range(5)]
+    for each in moved:
+        assert np.array_equal(each.colour_of_patch, HAND.pattern.colour_of_patch)
+        assert 0.01 < (each.patch != HAND.pattern.patch).mean() < 0.3
+    assert not np.array_equal(moved[0].patch, moved[1].patch)

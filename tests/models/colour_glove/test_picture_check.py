@@ -59,7 +59,7 @@ def told(check: PictureCheck, labels: np.ndarray, light: float = 1.0) -> list[st
 
 
 def is_beyond(finding: Finding) -> bool:
-    low = finding.kind in ("under-exposed", "no hand")
+    low = finding.kind in ("under-exposed", "no hand", "mirrored")
     return finding.value < finding.limit if low else finding.value > finding.limit
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from lamplight import LIGHTS, ROOMS, Scene, lit_picture, taken
+from other_gloves import other_hand
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import palm_centre, pose_database
@@ -27,7 +29,6 @@ from glovecal_models.colour_glove.photograph import (
 )
 from glovecal_models.colour_glove.pictures.classify import ColourTable
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
-from glovecal_models.colour_glove.pose.error_learning import other_hand
 from glovecal_models.colour_glove.pose_set import PAPER_COUNT, generated_poses
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.hand.skeleton import hand_skeleton
@@ -38,6 +39,9 @@ PATTERN = glove_pattern(SKIN)
 CAMERA = Camera()
 BEHIND = HandState(np.zeros(20), np.eye(3), np.array([0.0, 0.0, -500.0]))
 COUNT, SEED = 100, 9000
+OF_ONE_GLOVE = {"two hands", "mirrored", "another glove"}
+"""Said of a picture of one hand in this glove, these are false whatever its light is."""
+MOST_FALSE = 0.01
 RIGHT_LABELS = 0.85
 """Share of the glove, and of what is labelled, that is right: such a picture can be tracked."""
 
@@ -51,12 +55,14 @@ class Studio:
             "good": lambda i, rng: self.one(i, rng),
             "other bones and radii": lambda i, rng: self.one(i, rng, skin=other_hand(SKIN, SEED + i)),
             "motion blur": self.moving,
+            "shadows and gloss": self.lit,
             "no hand": lambda i, rng: self.photograph(BEHIND, rng),
             "two hands apart": lambda i, rng: self.two(i, rng, 250.0),
             "two hands close": lambda i, rng: self.two(i, rng, 140.0),
             "two hands overlapping": lambda i, rng: self.two(i, rng, 90.0),
             "another pattern": lambda i, rng: self.one(i, rng, pattern=OTHERS[i % len(OTHERS)]),
             "the other hand's glove": lambda i, rng: self.one(i, rng, skin=LEFT),
+            "mirrored": self.mirrored,
             "glove of one colour": lambda i, rng: self.one(i, rng, pattern=plain(1 + i % 10)),
             "other inks": self.other_inks,
             "cut off": lambda i, rng: self.photograph(at(self.states[i], (-1) ** i * 270.0), rng),
@@ -79,6 +85,22 @@ class Studio:
         """Exposed for a whole thirtieth of a second while the hand moves."""
         first, then = hand_motion(SKIN, 1.0, 30.0, seed=SEED + index)[10:12]
         return self.photograph(first, rng, until=then)
+
+    def mirrored(self, index, rng) -> Photograph:
+        found = self.one(index, rng)
+        picture, labels = (np.ascontiguousarray(each[:, ::-1]) for each in (found.picture, found.labels))
+        return Photograph(picture, labels)
+
+    def lit(self, index, rng) -> Photograph:
+        """Other hands as rooms light them, down to fingers that point aside."""
+        scene = Scene(
+            SEED + index, LIGHTS[index % len(LIGHTS)], ROOMS[index % len(ROOMS)],
+            gloss=rng.choice([0.0, 0.1, 0.25]), exposure=rng.uniform(0.75, 1.15),
+            jpeg=None if index % 3 else 85,
+        )  # fmt: skip
+        hand = other_hand(SKIN, SEED + index)
+        light, labels = lit_picture(scene, hand, PATTERN, CAMERA, [self.states[index]])
+        return Photograph(taken(scene, light, CAMERA.width), labels)
 
     def two(self, index, rng, apart_mm) -> Photograph:
         """The left hand, as far away as the right one is or a little nearer, drawn over it."""
@@ -124,7 +146,8 @@ EXPECTED = {
     "two hands close": ({"two hands"}, 0.9),
     "two hands overlapping": ({"two hands"}, 0.7),
     "another pattern": ({"another glove"}, 0.85),
-    "the other hand's glove": ({"another glove"}, 0.85),
+    "the other hand's glove": ({"mirrored"}, 0.85),
+    "mirrored": ({"mirrored"}, 0.85),
     "glove of one colour": ({"no hand", "another glove"}, 0.9),
     "other inks": ({"no hand", "another glove", "two hands"}, 0.9),
     "cut off": ({"cut off"}, 0.9),
@@ -145,16 +168,19 @@ def test_how_often_faults_are_found_and_right_pictures_blamed(tmp_path: Path, ca
     check, studio = PictureCheck(PoseLookup(database, pca_code(database.transforms))), Studio()
     times_ms = []
     lines, rates, blamed = [], {}, {}
-    for number, (kind, taken) in enumerate(studio.kinds.items()):
+    whole = false = 0
+    for number, (kind, photographed) in enumerate(studio.kinds.items()):
         counts, wrong, judged = Counter(), 0, 0
         for index in range(COUNT):
-            photograph = taken(index, np.random.default_rng([SEED, number, index]))
+            photograph = photographed(index, np.random.default_rng([SEED, number, index]))
             labels = table.labels(photograph.picture)
             began = time.perf_counter()
             kinds = [finding.kind for finding in check.findings(photograph.picture, labels)]
             times_ms.append(1e3 * (time.perf_counter() - began))
             counts.update(kinds or ["nothing"])
             rates[kind] = rates.get(kind, 0) + bool(set(kinds) & EXPECTED.get(kind, (set(), 0))[0]) / COUNT
+            if kind not in EXPECTED and not on_the_rim(photograph.labels):
+                whole, false = whole + 1, false + bool(set(kinds) & OF_ONE_GLOVE)
             if kind not in EXPECTED and is_right(photograph.labels, labels):
                 judged += 1
                 wrong += bool(kinds)
@@ -167,19 +193,24 @@ def test_how_often_faults_are_found_and_right_pictures_blamed(tmp_path: Path, ca
         print(f"\n{COUNT} drawn photographs of each kind, limit {check.distance_limit_px2:.1f} px^2")
         print("\n".join(lines))
         print(f"a check takes {np.median(times_ms):.1f} ms (median)")
+        print(f"one glove, whole in view: {false} of {whole} taken for two hands, mirrored or another glove")
+    assert false <= MOST_FALSE * whole
     for kind, (_, least) in EXPECTED.items():
         assert rates[kind] >= least, kind
     for kind, share in blamed.items():
         assert share <= 0.05, kind
 
 
+def on_the_rim(true: np.ndarray) -> bool:
+    return bool(true[0].any() or true[-1].any() or true[:, 0].any() or true[:, -1].any())
+
+
 def is_right(true: np.ndarray, labels: np.ndarray) -> bool:
     """Whole in view, and its colours mostly read as they are."""
-    rim = np.concatenate([true[0], true[-1], true[:, 0], true[:, -1]])
     glove, named = true > 0, labels > 0
     agree = (true == labels) & glove
     return (
-        not rim.any()
+        not on_the_rim(true)
         and agree.sum() >= RIGHT_LABELS * glove.sum()
         and agree.sum() >= RIGHT_LABELS * named.sum()
     )

@@ -15,6 +15,7 @@ import pypdfium2
 import pytest
 from board_pictures import BoardRoom, board_poses
 from cli_running import Run
+from phone_videos import phone_video
 
 from glovecal_client.pictures.source import Picture
 from glovecal_client.pictures.video_file import VideoWriter
@@ -144,3 +145,19 @@ def test_a_colour_table_is_learned_on_labelled_pictures(run: Run, tmp_path: Path
     card = run("camera", "colours", hand, "--out", tmp_path / "no.npz")
     assert (card.code, "page is not found" in card.said or "does not look like" in card.said) == (1, True)
     assert not (tmp_path / "no.npz").exists()
+
+
+def test_a_phones_video_is_imported_with_its_own_times(run: Run, tmp_path: Path) -> None:
+    pictures = [np.full((48, 64, 3), 90, np.uint8)] * 8
+    phone_video(tmp_path / "IMG_0042.MOV.mov", pictures, [30 + 20 * (number % 2) for number in range(8)])
+    phone = (tmp_path / "IMG_0042.MOV.mov").rename(tmp_path / "IMG_0042.MOV")
+    imported = run("camera", "import", phone)
+    assert imported.code == 0, imported.err
+    assert "img_0042: 8 pictures in 0.3 s; the file's own times, a variable rate, 20.0 to 33.3 Hz." in (
+        imported.out
+    )
+    again = run("camera", "import", phone, "--name", "fist", "--json")
+    assert (again.json["name"], again.json["pictures"]) == ("fist", 8)
+    (tmp_path / "no.mp4").write_text("no video")
+    refused = run("camera", "import", tmp_path / "no.mp4")
+    assert (refused.code, "cannot be read as a video" in refused.said) == (1, True)

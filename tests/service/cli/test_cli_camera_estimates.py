@@ -19,6 +19,7 @@ pytest.importorskip("numba")
 
 from camera_support import BESIDE, SMALL, prepared_once, ready_folder
 from cli_running import Run, glovecal
+from other_gloves import other_hand
 
 from glovecal_client.pictures.label_file import LabelWriter
 from glovecal_client.pictures.source import Picture
@@ -26,7 +27,7 @@ from glovecal_client.pictures.video_file import VideoWriter
 from glovecal_models.colour_glove.camera_model import Camera, write_cameras
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.photograph import hand_motion
-from glovecal_models.colour_glove.pose.error_learning import other_hand
+from glovecal_models.colour_glove.pose.both_ways import followed_both_ways
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.errors import Cancelled
@@ -98,10 +99,11 @@ def test_every_frame_is_tracked_and_what_is_broken_is_counted(
     assert found.simulated
     assert found.time_s == pytest.approx([stamps[at] / 1e9 for at in range(13) if at != 3])
     assert np.isnan(found.angles_deg[[5, 6]]).all()
-    # Frame by frame, as a live camera would.
-    tracker = tracking_setup(TrackingSettings(data=data, **SMALL), ["rendered"]).tracker("dense")
-    for row, at in enumerate(at for at in range(13) if at != 3):
-        pose = tracker.track([pictures[at]], stamps[at] / 1e9)
+    # As the library follows them.
+    setup = tracking_setup(TrackingSettings(data=data, **SMALL), ["rendered"])
+    moments = [([pictures[at]], stamps[at] / 1e9) for at in range(13) if at != 3]
+    poses = followed_both_ways(setup.tracker("dense"), setup.tracker("dense"), moments)
+    for row, pose in enumerate(poses):
         if pose is not None:
             assert found.angles_deg[row] == pytest.approx(pose.state.angles_deg)
             assert (found.accepted[row] == pose.accepted).all()
@@ -114,7 +116,8 @@ def test_every_frame_is_tracked_and_what_is_broken_is_counted(
     assert "2 without a hand" in plain.out
     assert "mean SD of accepted, degrees" in plain.out
     assert "marked as simulated" in plain.out
-    assert "13 frames at 30.0 Hz, 1 stamped twice" in plain.out
+    assert "13 frames at 30.0 Hz (times of " in plain.out
+    assert "), 1 stamped twice." in plain.out
 
 
 def test_a_video_is_tracked_as_far_as_it_can_be_read(
@@ -173,7 +176,7 @@ def test_frames_of_two_cameras_are_matched_by_their_times(
         (elsewhere, "two computers"),
         (left, "named twice"),
         (labels_file(tmp_path / "later.labels", seen, [s + 10**10 for s in beside]), "same time"),
-        (calibration, "no recording of Glovecal"),
+        (calibration, "no recording of a camera"),
     ):
         refused = estimates(left, other, "--out", tmp_path / "no.npz", "--calibration", calibration)
         assert (refused.code, why in refused.said) == (1, True), refused.said

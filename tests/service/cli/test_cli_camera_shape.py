@@ -14,11 +14,11 @@ pytest.importorskip("numba")
 
 from camera_support import SMALL, ready_folder
 from cli_running import glovecal
+from other_gloves import other_hand
 
 from glovecal_client.pictures.label_file import LabelWriter
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.photograph import hand_motion
-from glovecal_models.colour_glove.pose.error_learning import other_hand
 from glovecal_models.colour_glove.pose.hand_shape_fit import ShapeOnFile, read_shape, write_shape
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import RADII_MM, hand_skin, posed

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from phone_videos import phone_video
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 pytest.importorskip("cv2")
@@ -21,7 +22,10 @@ from glovecal_client.keys import GloveKeys
 from glovecal_client.rest import Refused, RestClient
 from glovecal_client.session import open_router
 from glovecal_models.colour_glove.camera_model import write_cameras
-from glovecal_service.camera.tracking_setup import ASSUMED
+from glovecal_models.colour_glove.pattern import printed_pattern
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
+from glovecal_models.colour_glove.skin import hand_skin
+from glovecal_service.camera.tracking_setup import ASSUMED, RenderedGlove
 from glovecal_service.rest.glove.cameras import said_of_itself
 from glovecal_service.rest.in_process import in_process_client
 from glovecal_service.settings import Settings
@@ -106,6 +110,43 @@ def test_a_camera_from_its_start_to_its_end(client: RestClient, settings: Settin
             client.post("/cameras", {"glove": "x", "source": source})
     with pytest.raises(Refused, match="reserved"):
         client.post("/cameras", {"glove": "service", "source": "rendered"})
+
+
+def test_a_phones_video_is_imported_and_played(
+    client: RestClient, settings: Settings, tmp_path: Path
+) -> None:
+    cv2 = pytest.importorskip("cv2")
+    ready_folder(settings.data)
+    phone = tmp_path / "IMG 0042.MOV"
+    drawn = RenderedGlove(PrintedHand(hand_skin(), printed_pattern()), ASSUMED)
+    pictures = [cv2.resize(drawn.draw(number / 20), (1280, 960)) for number in range(12)]
+    phone_video(tmp_path / "a.mov", pictures, [40 + 30 * (number % 2) for number in range(12)])
+    (tmp_path / "a.mov").rename(phone)
+    body = {"upload": client.upload(phone), "filename": phone.name}
+    kept = client.put("/camera-files/videos/phone", body)
+    told = "the file's own times, a variable rate, 14.3 to 25.0 Hz"
+    assert kept == {"name": "phone", "pictures": 12, "seconds": pytest.approx(0.59), "times": told}
+    assert client.get("/camera-files/videos") == [kept]
+    assert client.get(f"/uploads/{body['upload']}/kind") == {"kind": "video"}
+    table = tmp_path / "no.mp4"
+    table.write_text("time_s,a\n0,1\n")
+    with pytest.raises(Refused, match="cannot be read as a video"):
+        client.put("/camera-files/videos/other", {"upload": client.upload(table), "filename": table.name})
+    with pytest.raises(Refused, match="is no video that can be read"):
+        client.put("/camera-files/videos/other", {"upload": client.upload(table), "filename": "no.csv"})
+    with pytest.raises(Refused, match="no video 'other'; there are: phone"):
+        client.post("/cameras", {"glove": "x", "source": "video:other"})
+    with open_router([settings.zenoh]):
+        asked = {"glove": "filmed", "source": "video:phone", "stage": "nearest", "keep": "nothing"}
+        client.post("/cameras", asked | SMALL)
+
+        def played() -> bool:
+            return "is over after 12 pictures" in client.get("/cameras/filmed")["sentence"]
+
+        eventually(played, "it was played to its end")
+    summary = client.get("/cameras/filmed")["sentence"]
+    assert "12 pictures, " in summary
+    assert " 0 unusable" in summary
 
 
 @pytest.mark.parametrize("camera", [None, 3, {}, {"source": 5}, {"rotations": [{}]}])

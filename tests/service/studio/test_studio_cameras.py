@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from phone_videos import phone_video
 from playwright.sync_api import expect
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -14,6 +17,7 @@ pytest.importorskip("cv2")
 pytest.importorskip("numba")
 
 from camera_support import SMALL, camera_process, ready_folder
+from dropping import drop
 from studio_support import Open, serious
 
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
@@ -72,6 +76,20 @@ def test_it_is_a_glove_on_the_page_live_too(opened: Open, drawn: None) -> None:
     card = opened("live").page.get_by_role("region", name="Glove drawn", exact=True)
     expect(card.locator(".state-word").first).to_have_text("ok, simulated")
     expect(card.locator(".angle")).to_have_count(len(FINGER_ROTATIONS))
+
+
+def test_a_phones_video_that_is_dropped_is_offered_for_tracking(opened: Open, tmp_path: Path) -> None:
+    phone_video(tmp_path / "Fist 1.mp4", [np.full((48, 64, 3), 90, np.uint8)] * 6, [33, 50, 33, 50, 33, 50])
+    seen = opened("cameras")
+    drop(seen.page, [tmp_path / "Fist 1.mp4"])
+    expect(seen.page).to_have_url(re.compile("video=fist-1"))
+    form = seen.page.get_by_role("region", name="New camera")
+    expect(form.get_by_label("Pictures of")).to_have_value(
+        re.compile("^Video fist-1: 0 s; the file's own times")
+    )
+    expect(form.get_by_role("checkbox", name="The pictures are mirrored")).not_to_be_checked()
+    assert serious(seen.page) == []
+    assert seen.complaints == []
 
 
 def test_without_a_camera_the_page_says_so(opened: Open) -> None:

@@ -17,6 +17,10 @@ import cv2
 import numba
 import numpy as np
 
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.pattern import Pattern
+from glovecal_models.colour_glove.photograph import labelled_photographs
+from glovecal_models.colour_glove.skin import HandSkin
 from glovecal_models.documents import UNREADABLE_ARCHIVE
 from glovecal_models.errors import BadInput
 
@@ -30,10 +34,14 @@ _MOST_PIXELS = 4000
 _LEAST_OF_A_COLOUR = 30
 _FLOOR = 0.02
 """Least standard deviation along any direction, in logarithms."""
-_BACKGROUND_SHARE = 0.3
+_BACKGROUND_SHARE = 0.2
 """Prior of no glove."""
-_FARTHEST = 4.5
+_FARTHEST = 5.0
 """Standard deviations from every component of its colour, beyond which a pixel is no glove."""
+_LIKELY_SHARE, _LIKELY_FARTHEST = 0.005, 9.0
+"""The same two where glove is all around: a shadow or a highlight darkens or pales what was learned."""
+_AROUND = 1 / 40
+"""Of the picture's width: a gap that glove is around; fingers are as wide."""
 FILTER_PX, FILTER_LEVELS = 5, 30.0
 """Diameter of the bilateral filter, and the difference of colour that it does not cross."""
 _LEAST_COLOURS = 3
@@ -44,6 +52,8 @@ _LEAST_COLOURS = 3
 class ColourTable:
     labels_of: np.ndarray
     """(64, 64, 64) uint8 by blue, green, red: a colour of the glove, or 0."""
+    likely_of: np.ndarray
+    """The same, where glove is around: hardly anything else is to be expected there."""
 
     @classmethod
     def trained(
@@ -69,7 +79,7 @@ class ColourTable:
             np.meshgrid(*[(np.arange(LEVELS) + 0.5) * (256 / LEVELS)] * 3, indexing="ij"), axis=-1
         )
         cells = _features(grid.reshape(-1, 3))
-        best, table = np.full(len(cells), -np.inf), np.zeros(len(cells), np.uint8)
+        best, table = np.full((2, len(cells)), -np.inf), np.zeros((2, len(cells)), np.uint8)
         colours = max(int(image.max()) for image in label_images)
         for colour in range(colours + 1):
             own = points[label == colour]
@@ -81,42 +91,70 @@ class ColourTable:
             own = own[rng.permutation(len(own))[:_MOST_PIXELS]]
             mixture = _Mixture.fitted(own, COMPONENTS if colour else BACKGROUND_COMPONENTS, rng)
             density, apart = mixture.log_density(cells)
-            share = _BACKGROUND_SHARE if colour == 0 else (1.0 - _BACKGROUND_SHARE) / colours
-            score = density + np.log(share)
-            if colour:
-                score = np.where(apart <= _FARTHEST, score, -np.inf)
-            table[score > best] = colour
-            best = np.maximum(best, score)
-        return cls(table.reshape(LEVELS, LEVELS, LEVELS))
+            for strict, (background, farthest) in enumerate(
+                ((_LIKELY_SHARE, _LIKELY_FARTHEST), (_BACKGROUND_SHARE, _FARTHEST))
+            ):
+                share = background if colour == 0 else (1.0 - background) / colours
+                score = density + np.log(share)
+                if colour:
+                    score = np.where(apart <= farthest, score, -np.inf)
+                table[strict][score > best[strict]] = colour
+                best[strict] = np.maximum(best[strict], score)
+        likely, labels_of = table.reshape(2, LEVELS, LEVELS, LEVELS)
+        return cls(labels_of, likely)
 
     def labels(self, picture: np.ndarray) -> np.ndarray:
         """(H, W) uint8. Areas of fewer than three colours are no glove. Raises BadInput for no picture."""
         _require_picture(picture)
         picture = smoothed(picture)
-        return with_edges(picture, many_coloured(looked_up(picture, self.labels_of)))
+        labels = many_coloured(looked_up(picture, self.labels_of))
+        around = np.ones((2 * round(_AROUND * picture.shape[1] / 2) + 1,) * 2, np.uint8)
+        inside = cv2.morphologyEx((labels > 0).astype(np.uint8), cv2.MORPH_CLOSE, around) > 0
+        unclear = inside & (labels == 0)
+        labels = np.where(unclear, looked_up(picture, self.likely_of), labels)
+        return with_edges(picture, labels)
 
     def save(self, file: Path) -> None:
         with file.open("wb") as stream:
-            np.savez_compressed(stream, labels_of=self.labels_of)
+            np.savez_compressed(stream, labels_of=self.labels_of, likely_of=self.likely_of)
 
     @classmethod
     def load(cls, file: Path) -> ColourTable:
         """Raises BadInput for a file that holds something else."""
         try:
             with ZipFile(file) as archive:
-                if archive.getinfo("labels_of.npy").file_size > _LARGEST_TABLE:
+                if any(each.file_size > _LARGEST_TABLE for each in archive.infolist()):
                     raise BadInput(f"{file.name} holds more than a table of colours")
             with file.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
                 table = held["labels_of"]
+                # Tables of earlier versions tell nothing more where glove is around.
+                likely = held["likely_of"] if "likely_of" in held.files else table
         except BadInput:
             raise
         except UNREADABLE_ARCHIVE as error:
             raise BadInput(
                 f"{file.name} holds no table of colours that can be read; glovecal camera colours makes one"
             ) from error
-        if table.shape != (LEVELS,) * 3 or table.dtype != np.uint8:
-            raise BadInput(f"{file.name} holds a table {table.shape} {table.dtype}, not 64 x 64 x 64 uint8")
-        return cls(table)
+        for each in (table, likely):
+            if each.shape != (LEVELS,) * 3 or each.dtype != np.uint8:
+                raise BadInput(f"{file.name} holds a table {each.shape} {each.dtype}, not 64 x 64 x 64 uint8")
+        return cls(table, likely)
+
+
+def drawn_colours(
+    skin: HandSkin,
+    pattern: Pattern,
+    *,
+    inks: np.ndarray | None = None,
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> ColourTable:
+    """The table of colours learned from ``labelled_photographs`` before the camera assumed.
+
+    What a strong light cuts off at the end of a channel no correction brings back, but a table learned in
+    such light (``gains``) knows how the colours look.
+    """
+    examples = labelled_photographs(skin, pattern, Camera(), inks=inks, gains=gains)
+    return ColourTable.trained([each.picture for each in examples], [each.labels for each in examples])
 
 
 def smoothed(picture: np.ndarray) -> np.ndarray:
@@ -167,13 +205,18 @@ def with_edges(picture: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """Labels (H, W) with the mixed pixels along edges given to the side they look more like.
 
     A pixel without a colour, two or fewer from one that has one, takes the label of the most similar pixel
-    of the 5 x 5 around it; among those without a colour only what lies deeper counts.
+    of the 5 x 5 around it; among those without a colour only what lies deeper counts. What lies between two
+    patches is a mixture of both, and looks like neither: it takes that of the more similar one.
     """
     glove = (labels > 0).astype(np.uint8)
     deep = cv2.dilate(glove, np.ones((3, 3), np.uint8)) == 0
     near = (cv2.dilate(glove, np.ones((5, 5), np.uint8)) > 0) & (glove == 0)
-    rows, columns = np.nonzero(near)
-    return most_alike(picture, labels, deep, rows, columns)
+    between = cv2.morphologyEx(glove, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
+    rows, columns = np.nonzero(near & ~between)
+    outside = most_alike(picture, labels, deep, rows, columns)
+    rows, columns = np.nonzero(near & between)
+    inside = most_alike(picture, labels, np.zeros_like(deep), rows, columns)
+    return np.where(near & between, inside, outside)
 
 
 @numba.njit(cache=True)

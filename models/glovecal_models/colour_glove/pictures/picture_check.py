@@ -1,7 +1,7 @@
 """Whether a picture shows what can be tracked: one hand in this glove, whole, in fit light.
 
-Limits were set on drawn photographs (``colour_glove.photograph``) and proved on others:
-tests/models/colour_glove/test_picture_check_rates.py.
+Limits were set on drawn photographs, also with cast shadows and gloss, and proved on others:
+tests/models/colour_glove/test_picture_check_rates.py. Pictures are taken at the working size.
 
 The glove in a label image, looked up; a sleeve or a thing of one of its colours beside it is left out.
 
@@ -12,6 +12,7 @@ pieces of one colour are left out one by one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,7 +30,7 @@ MUCH_NEARER = 0.6
 """Of the distance with the piece. Leaving out a patch of the glove made it 1.3 times and more."""
 LEAST_PIECE = 0.12
 """Of all pixels with a colour: a smaller sleeve moves the window little."""
-KINDS = ("over-exposed", "under-exposed", "no hand", "two hands", "cut off", "another glove")
+KINDS = ("over-exposed", "under-exposed", "no hand", "two hands", "cut off", "mirrored", "another glove")
 LEAST_GLOVE = 0.002
 """Share of a picture: a hand of fewer pixels is too small to tell its pose."""
 MOST_CLIPPED = 0.22
@@ -40,8 +41,13 @@ LEAST_BRIGHT, LEAST_BRIGHT_OF_PICTURE = 150.0, 115.0
 """Level of 255 that the brightest twentieth of the glove, or of a picture without one, reaches."""
 MOST_SECOND = 0.3
 """Second area of many colours, over the first: a hand seen in two pieces has a smaller one."""
-MOST_EXTRA_AREAS = 2
+MOST_EXTRA_AREAS = 1
 """Areas of one colour beyond the patches of one hand; a finger before a patch cuts it in two."""
+ONE_HAND = 0.75
+"""Of the limit of ``another glove``: what is nearer than that is one hand, whatever its areas are."""
+MIRROR_NEARER, MIRROR_AS_FAR = 0.75, 1.5
+"""Distance of the mirror image over the picture's own. A picture of this glove is far nearer than its mirror
+image (1.6 times in 99 of 100), one that was mirrored far farther, and another glove is as far either way."""
 MOST_ON_EDGE = 1 / 80
 """Of the picture's width: pixels of the glove that lie on its edge."""
 SURPLUS_PX2 = 6.0
@@ -53,6 +59,9 @@ _JOINED, _FILLED = 0.06, 0.2
 _LEAST_COLOURS = 3
 _OF_AREA, _OF_GLOVE = 0.02, 0.008
 """Least share of an area that a colour has, and of the glove that a patch has, to be counted."""
+_PATCH_GRID, _PATCH_JOINED = 96, 2
+"""Cells along the glove's longer side in which patches are counted, and how far pieces of one patch, which a
+shadow or a shine divides, may lie apart."""
 _ASKED_ENTRIES, _OF_ENTRIES_PERCENT = 200, 95
 
 
@@ -66,12 +75,13 @@ class Sighting:
     @classmethod
     def of(cls, labels: np.ndarray, lookup: PoseLookup) -> Sighting | None:
         """None where there is no glove. Raises BadInput for another kind of array."""
-        found = _looked_up(labels, lookup)
+        found = _looked_up(labels, lookup, (0, 1, 2, 3))
         if found is None or found.distance_px2 <= STRANGE_PX2:
             return found
         best, least = found, MUCH_NEARER * found.distance_px2
+        turns = sorted({0, found.neighbours.quarter_turns})
         for without in _without_each_large_piece(labels):
-            other = _looked_up(without, lookup)
+            other = _looked_up(without, lookup, turns)
             if other is not None and other.distance_px2 < least:
                 best, least = other, other.distance_px2
         return best
@@ -82,12 +92,12 @@ class Sighting:
         return float(self.neighbours.distances[0])
 
 
-def _looked_up(labels: np.ndarray, lookup: PoseLookup) -> Sighting | None:
+def _looked_up(labels: np.ndarray, lookup: PoseLookup, turns: Sequence[int]) -> Sighting | None:
     window = glove_window(labels)
     tiny = None if window is None else tiny_image(labels, window)
     if window is None or tiny is None or not tiny.any():
         return None
-    return Sighting(labels, window, lookup.neighbours(tiny))
+    return Sighting(labels, window, lookup.neighbours_of_any_turn(tiny, STRANGE_PX2, turns))
 
 
 def _without_each_large_piece(labels: np.ndarray) -> list[np.ndarray]:
@@ -149,23 +159,40 @@ class PictureCheck:
                 ),
             )  # fmt: skip
         seen = None if self.lookup is None else Sighting.of(labels, self.lookup)
+        is_one_hand = False
         if seen is not None:
             labels = seen.labels
-        found = (_second_hand(labels) or _hands_that_touch(labels), _cut_off(labels))
+            is_one_hand = seen.distance_px2 <= ONE_HAND * self.distance_limit_px2
+        second = _second_hand(labels) or (None if is_one_hand else _hands_that_touch(labels))
+        found = (second, _cut_off(labels))
         said = tuple(finding for finding in found if finding is not None)
         return said or (() if seen is None else self._of_pattern(seen))
 
     def _of_pattern(self, seen: Sighting) -> tuple[Finding, ...]:
-        distance = seen.distance_px2
-        if distance <= self.distance_limit_px2:
+        distance, limit = seen.distance_px2, self.distance_limit_px2
+        if self.lookup is None or distance <= ONE_HAND * limit:
+            return ()
+        tiny = tiny_image(seen.labels, seen.window)
+        mirrored = float(self.lookup.neighbours_of_any_turn(tiny[:, ::-1]).distances[0])
+        if mirrored <= min(limit, MIRROR_NEARER * distance):
+            return (
+                Finding(
+                    "mirrored", mirrored, MIRROR_NEARER * distance,
+                    f"The picture is mirrored, or this is the glove of the other hand: its mirror image "
+                    f"resembles this glove (image distance {mirrored:.1f} squared pixels instead of "
+                    f"{distance:.1f}). Webcams and phones often mirror their preview: switch that off in the "
+                    "camera's settings, or say that the pictures are mirrored (--mirrored). For the glove of "
+                    "the other hand choose that hand (--hand).",
+                ),
+            )  # fmt: skip
+        if distance <= limit or mirrored > MIRROR_AS_FAR * distance:
             return ()
         return (
             Finding(
-                "another glove", distance, self.distance_limit_px2,
+                "another glove", distance, limit,
                 f"No pose of this glove looks like this: image distance {distance:.1f} squared pixels "
-                f"(limit {self.distance_limit_px2:.1f}). Possible causes: another glove, or the other hand; "
-                "a sleeve or a thing in one of the glove's colours beside it; a colour cast; fingers that "
-                "point down.",
+                f"(limit {limit:.1f}). Possible causes: another glove; a sleeve or a thing in one of the "
+                "glove's colours beside it; a colour cast; fingers that point at the camera.",
             ),
         )  # fmt: skip
 
@@ -261,12 +288,16 @@ def _hands_that_touch(labels: np.ndarray) -> Finding | None:
     """Areas of one colour beyond those that one glove has, summed over the colours."""
     u, v, width, height = cv2.boundingRect((labels > 0).astype(np.uint8))
     labels = labels[v : v + height, u : u + width]
-    least, extra = _OF_GLOVE * np.count_nonzero(labels), 0
+    share = _PATCH_GRID / max(width, height, 1)
+    size = max(1, round(width * share)), max(1, round(height * share))
+    least, extra = _OF_GLOVE * share**2 * np.count_nonzero(labels), 0
     for colour in range(1, int(labels.max()) + 1):
-        own = cv2.morphologyEx((labels == colour).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-        _, _, stats, _ = cv2.connectedComponentsWithStats(own, connectivity=8)
-        areas = np.count_nonzero(stats[1:, cv2.CC_STAT_AREA] > least)
-        extra += max(0, int(areas) - PATCHES // COLOURS)
+        own = cv2.resize((labels == colour).astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
+        own = cv2.morphologyEx(own.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+        joined = cv2.dilate(own, np.ones((2 * _PATCH_JOINED + 1,) * 2, np.uint8))
+        count, areas = cv2.connectedComponents(joined, connectivity=8, ltype=cv2.CV_32S)
+        sizes = np.bincount(areas[own > 0], minlength=count)[1:]
+        extra += max(0, int((sizes > least).sum()) - PATCHES // COLOURS)
     if extra <= MOST_EXTRA_AREAS:
         return None
     return Finding(

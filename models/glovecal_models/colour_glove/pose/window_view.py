@@ -24,6 +24,8 @@ CELLS, DRAWN_POINTS, SEEN_POINTS = 32, 3, 6
 CUFF_MM = 20.0
 """From the wrist towards the fingers: a forearm or a sleeve may hide the glove that far. Where this part is
 drawn and no glove is seen, nothing is concluded."""
+PARTS = "WTIMRP"
+"""Of a hand: the palm, thumb to pinky."""
 MARGIN = 1.15
 """Of the crop's window: a finger that the crop lost is still seen."""
 
@@ -40,12 +42,18 @@ class PrintedHand:
         object.__setattr__(self, "is_cuff", np.append(behind, False))
         object.__setattr__(self, "patch_of", np.append(self.pattern.patch, 0).astype(np.uint8))
         object.__setattr__(self, "colour_of", np.append(0, self.pattern.colour_of_patch).astype(np.uint8))
+        mostly = self.skin.joints[self.skin.triangles[:, 0], 0]
+        letters = [joint.name[0] for joint in self.skin.skeleton.joints]
+        parts = np.array([PARTS.index(letter) for letter in letters])[mostly]
+        object.__setattr__(self, "part_of", np.append(parts, 0).astype(np.uint8))
 
     patch_of: np.ndarray = None  # type: ignore[assignment]
     colour_of: np.ndarray = None  # type: ignore[assignment]
     """(T + 1,) and (P + 1,) uint8: of the background 0."""
     is_cuff: np.ndarray = None  # type: ignore[assignment]
     """(T + 1,) bool."""
+    part_of: np.ndarray = None  # type: ignore[assignment]
+    """(T + 1,) uint8: whose bone moves a triangle most, by ``PARTS``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +106,12 @@ class WindowView:
         """Points whose colours seen and drawn (``shown``) differ, and points of glove in either."""
         return differing(self.labels, shown, hand.patch_of, hand.colour_of, hand.is_cuff)
 
+    def disagreeing_parts(self, hand: PrintedHand, shown: np.ndarray) -> np.ndarray:
+        """(6, 2): of each of ``PARTS`` the drawn points whose colour seen is another, and all drawn."""
+        return differing_parts(
+            self.labels, shown, hand.patch_of, hand.colour_of, hand.is_cuff, hand.part_of, len(PARTS)
+        )
+
 
 @numba.njit(cache=True)
 def sampled(labels, low_u, low_v, step, count):  # type: ignore[no-untyped-def]
@@ -131,6 +145,23 @@ def differing(labels, shown, patch_of, colour_of, is_cuff):  # type: ignore[no-u
                 if drawn != seen:
                     different += 1
     return different, either
+
+
+@numba.njit(cache=True)
+def differing_parts(labels, shown, patch_of, colour_of, is_cuff, part_of, parts):  # type: ignore[no-untyped-def]
+    """Kernel: as ``differing``, of what is drawn, part by part."""
+    finer, counts = labels.shape[0] // shown.shape[0], np.zeros((parts, 2))
+    for v in range(shown.shape[0]):
+        for u in range(shown.shape[1]):
+            here = shown[v, u]
+            if here < 0:
+                continue
+            drawn = colour_of[patch_of[here]]
+            seen = labels[v * finer + finer // 2, u * finer + finer // 2]
+            counts[part_of[here], 1] += 1.0
+            if drawn != seen and not (seen == 0 and is_cuff[here]):
+                counts[part_of[here], 0] += 1.0
+    return counts
 
 
 @numba.njit(cache=True)

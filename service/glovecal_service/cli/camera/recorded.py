@@ -6,6 +6,7 @@ Angles for a take's reference; and bone lengths and radii of the gloved hand.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,8 +37,8 @@ def estimates(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            help="A recording, or those of two cameras before the same hand: videos (.mkv with its times "
-            "beside it) or files of label images (.labels).",
+            help="A recording, or those of two cameras before the same hand: videos (.mkv, or a phone's .mp4 "
+            "or .mov) or files of label images (.labels).",
             exists=True,
             dir_okay=False,
             show_default=False,
@@ -77,7 +78,7 @@ def _print(found: TrackedRecordings, file: Path) -> None:
             "unreadable": each.unreadable,
         }
         said = "".join(f", {count} {what}" for what, count in left_out.items() if count)
-        out.print(f"{each.name}: {each.frames} frames at {each.rate_hz:.1f} Hz{said}.")
+        out.print(f"{each.name}: {each.frames} frames at {each.rate_hz:.1f} Hz ({each.times}){said}.")
         if each.ended:
             out.print(f"  {each.ended}.")
     said = found.estimates
@@ -177,6 +178,30 @@ def _set_up(
             yield settings, recorded, setup, stop.is_set
         except Cancelled as cancelled:
             raise Refusal(f"stopped; nothing was written to {file}") from cancelled
+
+
+def prepare(tracking: TrackingOptions) -> None:
+    """Build what tracking needs before any picture is there: while the sheets are printed and sewn.
+
+    The pose database of this hand, how large the tracker's errors are, and the glove's colours. Kept in the
+    data folder; then a start of glovecal camera track takes seconds. With --calibration of two cameras for
+    both.
+    """
+    with camera_extra():
+        from glovecal_client.program import stopped_by_signals
+        from glovecal_service.camera.camera_settings import TrackingSettings
+        from glovecal_service.camera.tracking_setup import prepared
+
+    settings, stop = TrackingSettings(**tracking.settings()), threading.Event()
+    began = time.monotonic()
+    with stopped_by_signals(stop):
+        try:
+            with progress_bar() as report:
+                folder = prepared(settings, report, stop.is_set)
+        except Cancelled as cancelled:
+            raise Refusal("stopped; what was finished is kept") from cancelled
+    out.print(f"Ready after {time.monotonic() - began:.0f} s, in {as_typed(folder)}.")
+    out.print("Next: glovecal camera track SOURCE --glove GLOVE")
 
 
 def shape(

@@ -102,6 +102,11 @@ def sheets(
         more = f", and as SVG ({len(files) - 1} page{'s' if len(files) > 2 else ''})"
         out.print(f"  {name}: {files[0]}{more}")
     out.print("Print at 100 % and measure the 100 mm bar. How to sew, iron or paint: page 1 of glove.pdf.")
+    meanwhile = "Meanwhile, so that the first start takes seconds"
+    if subject is None:
+        out.print(f"{meanwhile}: glovecal camera prepare")
+    else:
+        out.print(f"{meanwhile}: glovecal camera prepare --subject {subject}")
 
 
 COLUMNS = {

@@ -24,7 +24,7 @@ def track(
     source: Annotated[
         str,
         typer.Argument(
-            help="camera:NUMBER (0 is the first), video:FILE.mkv, labels:FILE.labels, rendered (simulated).",
+            help="camera:NUMBER (0 is the first), video:FILE, labels:FILE.labels, rendered (simulated).",
             show_default=False,
         ),
     ],
@@ -42,7 +42,8 @@ def track(
 ) -> None:
     """Track the colour glove and publish its poses like any glove's. Ctrl-C stops it.
 
-    The first start builds the pose database and takes a minute or two.
+    The first start builds the pose database and takes some minutes; glovecal camera prepare does so
+    beforehand.
     """
     from glovecal_client.program import leave_at_once, say, stopped_by_signals
     from glovecal_service.camera.camera_settings import CameraSettings

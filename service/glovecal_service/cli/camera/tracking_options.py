@@ -55,11 +55,14 @@ ShapeOption = Annotated[
     Path | None,
     typer.Option(help="The hand's shape, as glovecal camera shape finds it.", exists=True, dir_okay=False),
 ]
+MirroredOption = Annotated[
+    bool,
+    typer.Option(
+        "--mirrored", help="Left and right of the pictures are exchanged, as a preview's often are."
+    ),
+]
 EntriesOption = Annotated[
     int, typer.Option(min=300, max=1_000_000, help="Of the pose database; the paper has 100,000.")
-]
-ClipsOption = Annotated[
-    int, typer.Option(min=3, max=1000, help="Rendered clips from which the stated deviations are learned.")
 ]
 DataOption = Annotated[
     Path, typer.Option(envvar="GLOVECAL_DATA", help="Folder of the database and of what is kept.")
@@ -76,8 +79,8 @@ class TrackingOptions:
     shape: ShapeOption = None
     subject: SubjectOption = None
     hand: HandOption = None
+    mirrored: MirroredOption = False
     entries: EntriesOption = 20_000
-    clips: ClipsOption = 36
     data: DataOption = Path("glovecal-data")
 
     def settings(self) -> dict[str, Any]:
@@ -90,7 +93,7 @@ class TrackingOptions:
         return {
             "data": self.data, "hand": own if self.hand is None else self.hand.value,
             "stage": self.stage.value, "colours": self.colours, "calibration": self.calibration,
-            "shape": self.shape, "entries": self.entries, "clips": self.clips, "sizes_mm": sizes_mm,
+            "shape": self.shape, "mirrored": self.mirrored, "entries": self.entries, "sizes_mm": sizes_mm,
         }  # fmt: skip
 
 

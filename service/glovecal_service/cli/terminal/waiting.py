@@ -1,4 +1,5 @@
-"""Waiting with a progress bar on a terminal and silence elsewhere: for a job, for some seconds."""
+"""Waiting with a progress bar on a terminal: for a job, for some seconds, for work in this process, which
+writes lines into a file."""
 
 from __future__ import annotations
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
 
 STEP_S = 0.1
+LINE_EVERY_S = 5.0
+"""Where progress goes into a file."""
 BAR_WIDTH, TEXT_WIDTH = 12, 44
 """Text, bar, percentage and time fit into 80 columns."""
 
@@ -70,11 +73,19 @@ def wait_seconds(seconds: float, what: str, *, quiet: bool = False) -> None:
 
 @contextmanager
 def progress_bar(*, quiet: bool = False) -> Iterator[Report]:
-    """For work in this process: what takes a sentence and the fraction done; time left is told from it."""
+    """For work in this process: what takes a sentence and the fraction done; time left is told from it.
+
+    Where nobody sees a bar it is a line every some seconds: "12 %: rendering; about 40 s left"."""
     with _bar(quiet) as progress:
-        bar, left = progress.add_task("", total=1.0), TimeLeft(0.0)
+        bar, left, said_s = progress.add_task("", total=1.0), TimeLeft(0.0), time.monotonic()
 
         def report(sentence: str, fraction: float) -> None:
+            nonlocal said_s
+            if not (quiet or err.is_terminal) and time.monotonic() - said_s >= LINE_EVERY_S:
+                said_s = time.monotonic()
+                seconds = left.seconds(fraction)
+                more = "" if seconds is None else f"; about {max(1, round(seconds))} s left"
+                err.print(f"{100 * fraction:.0f} %: {sentence}{more}")
             progress.update(
                 bar, completed=fraction, description=_short(sentence), left=left.seconds(fraction)
             )

@@ -259,6 +259,15 @@ class CameraFileNames(Row):
     calibrations: list[str] = Field(description="Made by `glovecal camera calibrate`.")
 
 
+class CameraVideo(Row):
+    """A video of a phone or a camera that was imported."""
+
+    name: str
+    pictures: int
+    seconds: float = Field(description="From its first picture to its last.")
+    times: str = Field(description="Where the times of its pictures come from, and how even they are.")
+
+
 class SerialPort(Row):
     """A serial port of the service's computer."""
 

@@ -23,7 +23,7 @@ from glovecal_service.store.errors import Conflict, NotFound
 
 router = APIRouter(prefix="/cameras", tags=["cameras"])
 
-Source = Annotated[str, Field(pattern=r"^(camera:[0-9]{1,2}|rendered)$")]
+Source = Annotated[str, Field(pattern=r"^(camera:[0-9]{1,2}|rendered|video:[a-z0-9][a-z0-9_-]{0,63})$")]
 
 
 BALANCED_WITHIN_S = 60.0
@@ -33,7 +33,10 @@ MOST_ENTRIES = 100_000
 
 class NewCamera(StrictBody):
     glove: Identifier
-    source: Source = Field(description="camera:0 is the first; rendered draws a moving glove, to try.")
+    source: Source = Field(
+        description="camera:0 is the first; video:NAME plays an imported video at its own pace; rendered "
+        "draws a moving glove, to try."
+    )
     stage: Stage = "dense"
     keep: Kept = Field("labels", description="pictures: as they came (FFV1); labels: of those tracked.")
     colours: Identifier | None = Field(
@@ -48,11 +51,11 @@ class NewCamera(StrictBody):
     hand: Literal["right", "left"] | None = Field(
         None, description="Null: the subject's, else the right one."
     )
+    mirrored: bool = Field(
+        False, description="Left and right of the pictures are exchanged, as a preview's often are."
+    )
     entries: Annotated[int, Field(ge=300, le=MOST_ENTRIES)] = Field(
         20_000, description="Of the pose database: 18 kB each on disk, a minute for 20,000."
-    )
-    clips: Annotated[int, Field(ge=3, le=1000)] = Field(
-        36, description="Rendered, from which the stated deviations are learned."
     )
 
 
@@ -65,21 +68,23 @@ class NewStage(StrictBody):
 )
 def start_camera(body: NewCamera, parts: PartsNeeded) -> CameraView:
     """Answers at once; ``state`` tells how far it is. The first time it builds the pose database, which takes
-    a minute or two. 404 for a colour table or calibration that is not kept; 409 where that glove is published
-    already, or too many cameras are on."""
+    half a minute. 404 for a colour table, calibration or video that is not kept; 409 where that glove is
+    published already, or too many cameras are on."""
     settings = parts.settings
     known = _cameras(parts)
     if body.glove in known and known[body.glove].state != "stopped":
         raise Conflict(f"a camera publishes glove {body.glove} already; stop it first")
     files = CameraFiles(settings.data / "cameras")
     worn_by = None if body.subject is None else parts.store.subjects.get(body.subject)
+    kind, _, name = body.source.partition(":")
+    source = f"video:{files.video(name).file}" if kind == "video" else body.source
     asked = CameraSettings(
-        body.source, body.glove, settings.site, settings.zenoh, body.subject, body.keep,
+        source, body.glove, settings.site, settings.zenoh, body.subject, body.keep,
         data=settings.data, hand=body.hand or (worn_by and worn_by.known_hand) or "right",
         stage=body.stage,
         colours=None if body.colours is None else files.path("colours", body.colours),
         calibration=None if body.calibration is None else files.path("calibrations", body.calibration),
-        entries=body.entries, clips=body.clips,
+        mirrored=body.mirrored, entries=body.entries,
         sizes_mm={} if worn_by is None else worn_by.dimensions,
     )  # fmt: skip
     return _silent(parts.cameras.started.start(asked))

@@ -1,0 +1,142 @@
+"""Hands that the tracker never saw, tracked: what the study of its errors is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from lit_glove import HARD, SOFT, LitGlove, a_light, free_motion, other_camera
+from worn_glove import ROTATIONS, WornGlove, family
+
+from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
+from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_colours
+from glovecal_models.colour_glove.pose.both_ways import followed_both_ways
+from glovecal_models.colour_glove.pose.hand_shape_fit import fitted_hand_shape
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker
+from glovecal_models.colour_glove.pose.window_view import PrintedHand
+from glovecal_models.errors import BadInput
+
+RATE_HZ, SECONDS = 30.0, 5.0
+FIRST_SEED = 9000
+"""What was chosen was chosen on seeds 500 to 599."""
+ASIDE_DEG, AROUND_MM = 60.0, 470.0
+"""The second camera looks at the same place from the side."""
+SHAPE_PICTURES = 30
+_ORDER = [ROTATIONS.index(name) for name in FINGER_ROTATIONS]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedHand:
+    """One hand's frames (F, 20): degrees, and whether each is accepted."""
+
+    light: str
+    frames: np.ndarray
+    """(F,) numbers."""
+    truth: np.ndarray
+    error: np.ndarray
+    sd: np.ndarray
+    accepted: np.ndarray
+    pixels: tuple[int, int]
+    """Of the glove: rightly labelled, all."""
+    bones: float | None
+    """RMS error of its bones' lengths, relative, where its shape was fitted."""
+
+
+def cameras(count: int) -> tuple[Camera, ...]:
+    angle = np.radians(-ASIDE_DEG)
+    turn = np.array(
+        [[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]]
+    )
+    around = np.array([0.0, 0.0, AROUND_MM])
+    shift = around - turn @ around
+    aside = replace(
+        other_camera(2),
+        rotation=tuple(tuple(map(float, row)) for row in turn),
+        translation_mm=(float(shift[0]), float(shift[1]), float(shift[2])),
+    )
+    return (other_camera(1), aside)[:count]
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is tracked, and how."""
+
+    folder: Path
+    count: int
+    seconds: float
+    entries: int
+    fits_shape: bool
+    first_seed: int = FIRST_SEED
+
+    @cached_property
+    def tracker(self) -> HandTracker:
+        return prepared_tracker(self.folder, cameras(self.count), entries=self.entries)
+
+    @cached_property
+    def colours(self) -> ColourTable:
+        file = self.folder / "colours.npz"
+        if not file.exists():
+            drawn_colours(self.tracker.hand.skin, self.tracker.hand.pattern).save(file)
+        return ColourTable.load(file)
+
+
+def tracked(study: Study, number: int) -> TrackedHand | None:
+    """A hand of its own, followed both ways at stage dense; None where its shape was to be fitted and was
+    refused."""
+    seed, light = study.first_seed + number, (SOFT, HARD)[number % 2]
+    glove = family(number + 1, study.first_seed)[number]
+    rooms = [
+        LitGlove(glove, camera, a_light(light, seed), seed + 977 * place)
+        for place, camera in enumerate(study.tracker.cameras)
+    ]
+    first, bones = study.tracker, None
+    if study.fits_shape:
+        angles, turns, places = free_motion(2.0 * SHAPE_PICTURES, 0.5, seed + 400)
+        views = [
+            [study.colours.labels(room.picture(*moment, 1000 + index)[0]) for room in rooms]
+            for index, moment in enumerate(zip(angles, turns, places, strict=True))
+        ]
+        try:
+            shape = fitted_hand_shape(first, views)
+        except BadInput:
+            return None
+        bones = _bones_off(shape.sizes_mm, glove)
+        fitted = PrintedHand(shape.skin, first.hand.pattern)
+        first = prepared_tracker(
+            study.folder / str(number), first.cameras, hand=fitted, entries=study.entries
+        )
+    angles, turns, places = free_motion(study.seconds, RATE_HZ, seed)
+    right = [0, 0]
+
+    def moments() -> Iterator[tuple[list[np.ndarray], float]]:
+        for index, moment in enumerate(zip(angles, turns, places, strict=True)):
+            found = []
+            for room in rooms:
+                picture, truth = room.picture(*moment, index)
+                found.append(study.colours.labels(picture))
+                right[0] += int((found[-1][truth > 0] == truth[truth > 0]).sum())
+                right[1] += int((truth > 0).sum())
+            yield found, index / RATE_HZ
+
+    forwards, backwards = (
+        HandTracker(first.hand, first.lookup, first.cameras, first.errors) for _ in range(2)
+    )
+    rows = []
+    for frame, pose in enumerate(followed_both_ways(forwards, backwards, moments())):
+        if pose is not None:
+            truth = angles[frame][_ORDER]
+            sd = pose.standard_deviation[: len(truth)]
+            rows.append((frame, truth, pose.state.angles_deg - truth, sd, pose.accepted))
+    frames, true, errors, deviations, accepted = (np.array(column) for column in zip(*rows, strict=True))
+    pixels = right[0], right[1]
+    return TrackedHand(light, frames, true, errors, deviations, accepted, pixels, bones)
+
+
+def _bones_off(sizes_mm: Mapping[str, float], glove: WornGlove) -> float:
+    names = [name for name in sizes_mm if name.endswith(("proximal", "middle"))]
+    off = [sizes_mm[name] / glove.sizes_mm[name] for name in names]
+    return float(np.std(off) / np.mean(off))
