@@ -183,9 +183,8 @@ def _set_up(
 def prepare(tracking: TrackingOptions) -> None:
     """Build what tracking needs before any picture is there: while the sheets are printed and sewn.
 
-    The pose database of this hand, how large the tracker's errors are, and the glove's colours. Kept in the
-    data folder; then a start of glovecal camera track takes seconds. With --calibration of two cameras for
-    both.
+    The pose database of this hand, and the glove's colours. Kept in the data folder; then a start of glovecal
+    camera track takes seconds.
     """
     with camera_extra():
         from glovecal_client.program import stopped_by_signals

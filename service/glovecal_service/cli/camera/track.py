@@ -42,8 +42,7 @@ def track(
 ) -> None:
     """Track the colour glove and publish its poses like any glove's. Ctrl-C stops it.
 
-    The first start builds the pose database and takes some minutes; glovecal camera prepare does so
-    beforehand.
+    The first start builds the pose database, in about a minute; glovecal camera prepare does so beforehand.
     """
     from glovecal_client.program import leave_at_once, say, stopped_by_signals
     from glovecal_service.camera.camera_settings import CameraSettings

@@ -61,8 +61,8 @@ class CamerasPage:
             heading(2, "Start a camera")
             ui.label(
                 "A cloth glove with the printed pattern, and one camera: poses go out like any glove's. "
-                "The first start builds the pose database and takes some minutes; glovecal camera prepare "
-                "does that beforehand."
+                "The first start builds the pose database, in about a minute; glovecal camera prepare does "
+                "that beforehand."
             )
             with ui.row().classes("camera-import"):
                 ui.label("A phone's video: drop it on the page, or")
