@@ -63,7 +63,8 @@ class DropZone:
 
     def button(self, text: str) -> ui.button:
         pick = f"() => runMethod({self._field.id}, 'pickFiles', [])"
-        return ui.button(text).on("click", js_handler=pick)
+        button = ui.button(text).props("outline no-caps").classes("studio-target")
+        return button.on("click", js_handler=pick)
 
     async def _received(self, event: events.MultiUploadEventArguments) -> None:
         self._field.reset()

@@ -286,7 +286,8 @@ def test_an_uncalibrated_glove_shows_its_raw_hand_linear_in_each_sensor(
         expect(switch).to_have_attribute("aria-pressed", "true")
         expect(card.get_by_text("is no calibration")).to_be_visible()
         expect(card.get_by_text("No calibrated pose")).not_to_be_visible()
-        card.page.wait_for_timeout(1500)
+        moved = "(([least, greatest]) => greatest > least)(view.spans.get('I_PIP') ?? [0, 0])"
+        eventually(lambda: view_of(card, moved), "the sensor moves")
         view_of(card, "view.socket.close()")
         raw = view_of(card, "[view.spans.get('I_PIP'), view.readings.I_PIP, view.uncalibrated()]")
         (least, greatest), reading, angles = raw

@@ -64,7 +64,7 @@ class CamerasPage:
                 "The first start builds the pose database, in about a minute; glovecal camera prepare does "
                 "that beforehand."
             )
-            with ui.row().classes("camera-import"):
+            with ui.row().classes("items-center"):
                 ui.label("A phone's video: drop it on the page, or")
                 self._drop.button("Import a video")
             with ui.element("div").classes("capture-fields"):

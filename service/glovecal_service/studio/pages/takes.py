@@ -46,7 +46,7 @@ class TakesPage:
                 "TRC, BVH); calibrations of other programs, models. What they are is shown before anything "
                 "is kept."
             )
-            self._around.drop.button("Choose files").props("outline no-caps").classes("studio-target")
+            self._around.drop.button("Choose files")
         self._found = ui.element("div").classes("findings").props('aria-live="polite"')
         self._train = TrainPanel(self._studio)
         if files:  # what is to be trained are these, once they are imported
