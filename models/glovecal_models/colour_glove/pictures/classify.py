@@ -124,7 +124,9 @@ class ColourTable:
         try:
             with ZipFile(file) as archive:
                 if any(each.file_size > _LARGEST_TABLE for each in archive.infolist()):
-                    raise BadInput(f"{file.name} holds more than a table of colours")
+                    raise BadInput(
+                        f"{file.name} holds more than a table of colours; glovecal camera colours makes one"
+                    )
             with file.open("rb") as stream, np.load(stream, allow_pickle=False) as held:
                 table = held["labels_of"]
                 # Tables of earlier versions tell nothing more where glove is around.
