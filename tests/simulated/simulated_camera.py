@@ -3,9 +3,10 @@
 No picture is made. What its errors are like was measured with the real tracker on rendered label images:
 hands of other bones and radii than the model's in gloves that lay as printed, their shape fitted first;
 labels spoilt as a classifier spoils them; two cameras 60 degrees apart, stage dense, 16 hands for 10 s each.
-Hands that another program draws (``python3 do.py study camera-errors``) are tracked less well. The errors last for almost a second, are as large as stated, and lean to the mean of a prior
-that predicts each joint from the others. With one camera the stated deviations are 1.2 to 3.3 times as large;
-where no shape was fitted, true deviations are 1.4 times the stated.
+Hands that another program draws (``python3 do.py study camera-errors``) are tracked less well. The errors
+last for almost a second, are as large as stated, and lean to the mean of a prior that predicts each joint
+from the others. With one camera the stated deviations are 1.2 to 3.3 times as large; where no shape was
+fitted, true deviations are 1.4 times the stated.
 """
 
 from __future__ import annotations
