@@ -22,7 +22,7 @@
                             (needs the shared recordings; a few minutes);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
-                            study camera-errors: what the colour glove's tracker errs by (quarter of an hour);
+                            study camera-errors: what the colour glove's tracker errs by (an hour);
                             study faults: kills, cuts, full disks at random: is anything lost? (two minutes;
                             --faults N, --seed S, --minutes N; --table lists what is tried)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;

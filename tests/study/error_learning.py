@@ -3,8 +3,8 @@
 The paper learns R, Q and P on a recorded sequence about local averages of its own answers (section 5.3);
 drawn hands have a truth, and errors that last are errors too. All is learned on drawn photographs, with an
 arm, a face and a room, in many lights, whose colours are classified; each clip has a hand, a glove that lies
-its own way, lenses and places of cameras of its own. It takes an hour, so what was learned comes with the
-package (``errors.npz``; ``python3 do.py study camera-errors --learn`` makes it).
+its own way, lenses and places of cameras of its own. It takes half an hour, so what was learned comes with
+the package (``errors.npz``; ``python3 do.py study camera-errors --learn`` makes it).
 """
 
 from __future__ import annotations

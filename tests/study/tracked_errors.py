@@ -174,7 +174,7 @@ def report(folder: Path, hands: int, seconds: float, *, entries: int, fits_shape
 
 
 def learn(folder: Path, clips: int) -> None:
-    """An hour of drawing: for one camera and two."""
+    """Half an hour of drawing: for one camera and two."""
     hand, arrays = PrintedHand(hand_skin(), printed_pattern()), {}
     poses, settings = generated_poses(PAPER_COUNT), DatabaseSettings(entries=ENTRIES)
     database = pose_database(hand.skin, hand.pattern, poses, folder, settings)

@@ -1,7 +1,7 @@
 """Whether a picture shows what can be tracked: one hand in this glove, whole, in fit light.
 
-Limits were set on drawn photographs, also with cast shadows and gloss, and proved on others:
-tests/models/colour_glove/test_picture_check_rates.py. Pictures are taken at the working size.
+Limits were set on drawn photographs, also with cast shadows and gloss; how often they are wrong on others
+tests/models/colour_glove/test_picture_check_rates.py counts. Pictures are taken at the working size.
 
 The glove in a label image, looked up; a sleeve or a thing of one of its colours beside it is left out.
 

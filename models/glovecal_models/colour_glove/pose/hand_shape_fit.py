@@ -51,8 +51,8 @@ PARAMETERS = ("size", *_BONES, *(f"{name} radius" for name in RADII_MM))
 """Logarithms of what lengths of the starting hand are multiplied by; ``size`` multiplies every length."""
 _WIDER = 4.0
 """By so much more than equal weights for all cells say is left open. With 1.4, right for a glove that lies as
-it was printed, gloves that lie aside (tests/simulated/worn_glove.py, seeds 500 and 501) gave bones
-that were 7.7 % wrong in place of 5.0; angles were as much better with either."""
+it was printed, a glove that lay aside (tests/simulated/worn_glove.py, seed 500) gave bones that were 7.7 %
+wrong in place of 5.0; its angles were as much better with either."""
 _ANGLES = len(FINGER_ROTATIONS)
 _STEP = 0.02
 _LONGEST = 0.12
