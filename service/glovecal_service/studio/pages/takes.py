@@ -43,8 +43,8 @@ class TakesPage:
             ui.label(
                 "Drop files anywhere on this page: recordings of a glove, as tables of any program (CSV, "
                 "text, Parquet) or from its memory card; angles that another system measured (a table, "
-                "TRC, BVH); calibrations of other programs, models. What they are is shown before anything "
-                "is kept."
+                "TRC, BVH); calibrations of other programs. What they are is shown before anything is kept. "
+                "Models and a phone's videos are imported at once."
             )
             self._around.drop.button("Choose files")
         self._found = ui.element("div").classes("findings").props('aria-live="polite"')
