@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import gc
 import inspect
+import logging
 import os
 import re
 import signal
+import sys
 import sysconfig
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -155,10 +158,18 @@ def _tell_warnings_of_others(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def process_as_it_was() -> Iterator[None]:
-    """A command sets its process's umask; here many commands and tests share one process."""
+    """A command sets its process's umask and where it logs to; here many commands and tests share a process.
+
+    The handler of a ``serve`` that a test had refused wrote tracebacks into what later commands said.
+    """
+    root = logging.getLogger()
     _reset_process()
+    level, hooks = root.level, (sys.excepthook, threading.excepthook)
     yield
     _reset_process()
+    root.handlers[:] = [each for each in root.handlers if type(each) is not logging.StreamHandler]
+    root.setLevel(level)
+    sys.excepthook, threading.excepthook = hooks
 
 
 def _reset_process() -> None:
