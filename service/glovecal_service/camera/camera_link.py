@@ -23,11 +23,14 @@ from glovecal_client.keys import JSON_ENCODING, GloveKeys
 from glovecal_client.session import REFUSAL_ENCODING, json_object, open_client
 from glovecal_client.wire.pose import POSE_ENCODING
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, PoseEstimate
+from glovecal_models.colour_glove.pictures.picture_check import light_advice
 from glovecal_models.errors import GlovecalError
 from glovecal_service.plain import reason_of
 
 LAST_POSES = 300
 """Over which latencies and shares are told: 10 s at 30 Hz."""
+LAST_LIGHT = 40
+"""Pictures checked over which the light is judged: a hand in one pose may shade itself."""
 SILENT_AFTER_S = 2.0
 Sees = str
 NOTHING_YET, HAND, NO_HAND = "nothing yet", "hand", "no hand"
@@ -45,6 +48,7 @@ class CameraHealth:
         """Pictures checked in which each kind was found."""
         self.present: dict[str, str] = {}
         """Sentences of the newest picture that was checked, by kind."""
+        self._shadowed: deque[float] = deque(maxlen=LAST_LIGHT)
         self._lock = threading.Lock()
         self._latencies_ms: deque[float] = deque(maxlen=LAST_POSES)
         self._spent_ms: deque[float] = deque(maxlen=LAST_POSES)
@@ -74,6 +78,12 @@ class CameraHealth:
         with self._lock:
             self.present = dict(found)
             self.findings.update(self.present.keys())
+
+    def note_light(self, shadowed: float | None) -> None:
+        """Share of the glove, of one more picture."""
+        if shadowed is not None:
+            with self._lock:
+                self._shadowed.append(shadowed)
 
     def note_pose(self, estimate: PoseEstimate, latency_ms: float, spent_ms: float) -> None:
         """``latency_ms`` from the picture's stamp to publication, ``spent_ms`` of it on labels and pose."""
@@ -113,6 +123,7 @@ class CameraHealth:
                 "unusable": self.unusable,
                 "findings": dict(self.present),
                 "findings_counted": dict(self.findings),
+                "advice": light_advice(self._shadowed),
                 "pose_rate_hz": self._pose_rate_hz(),
                 "latency_ms": _percentiles(self._latencies_ms),
                 "computing_ms": _percentiles(self._spent_ms),

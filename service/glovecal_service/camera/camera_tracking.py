@@ -24,6 +24,7 @@ from glovecal_client.errors import CaptureRefused
 from glovecal_client.pictures.source import PictureSource
 from glovecal_client.wire.pose import Pose, PoseFlag, RotationFlag, encode_pose
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS, STAGES, PoseEstimate
+from glovecal_models.colour_glove.pictures.picture_check import shadowed
 from glovecal_models.colour_glove.pose.both_ways import Follows
 from glovecal_models.errors import BadInput, Cancelled
 from glovecal_models.hand.skeleton import skeleton_document
@@ -191,6 +192,7 @@ class CameraTracking:
         self._checked_s = now
         found = self._setup.check.findings(pixels, labels)
         self.health.note_findings({each.kind: each.sentence for each in found})
+        self.health.note_light(shadowed(pixels, labels))
 
     def _publish(self, taken: NumberedPicture, estimate: PoseEstimate) -> float:
         """Latency in milliseconds, from the picture's stamp until the pose was handed to the network."""
@@ -378,4 +380,6 @@ _KEPT = {
 def _view(health: Mapping[str, Any]) -> str:
     if health["findings"]:
         return " ".join(health["findings"].values())
-    return "the hand is tracked" if health["sees"] == HAND else "no hand in view"
+    if health["sees"] != HAND:
+        return "no hand in view"
+    return " ".join(["the hand is tracked", *(["but", health["advice"]] if health["advice"] else [])])

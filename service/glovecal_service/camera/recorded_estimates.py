@@ -21,6 +21,7 @@ from glovecal_client.pictures.source import Picture, PictureSource
 from glovecal_client.pictures.video_file import OF_COMPUTER, VideoFilePictures
 from glovecal_client.pictures.video_file import SUFFIXES as VIDEOS
 from glovecal_models.colour_glove.hand_state import PoseEstimate, camera_estimates
+from glovecal_models.colour_glove.pictures.picture_check import light_advice, shadowed
 from glovecal_models.colour_glove.pose.both_ways import Follows, followed_both_ways
 from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES
 from glovecal_models.errors import BadInput
@@ -71,6 +72,8 @@ class TrackedRecordings:
     findings: dict[str, int]
     """Frames during which each thing was wrong with the view, such as two hands: no rotation is accepted."""
     took_s: float
+    advice: str
+    """What to change of the light; empty where nothing is."""
 
 
 class Recordings:
@@ -108,7 +111,7 @@ class Recordings:
         began, wanted = time.perf_counter(), len(self.rows[0])
         forwards, backwards = _Way(setup.tracker(stage)), _Way(setup.tracker(stage))
         poses: list[PoseEstimate | None] = []
-        found, views = Counter[str](), list[tuple[str, ...]]()
+        found, views, shadows = Counter[str](), list[tuple[str, ...]](), list[float]()
         at_s = np.mean([times[rows] for times, rows in zip(self.times_s, self.rows, strict=True)], axis=0)
         readers = [_Reader(source, rows) for source, rows in zip(self.sources, self.rows, strict=True)]
 
@@ -122,6 +125,7 @@ class Recordings:
                     labels = [setup.labels(each) for each in seen]
                     if at_s[frame] - checked_s >= CHECK_EVERY_S:
                         checked_s, present = at_s[frame], _findings(setup, seen, labels)
+                        shadows.extend(_shadows(seen, labels))
                 except UNUSABLE as error:
                     forwards.note(float(at_s[frame]), error)
                 views.append(present)
@@ -148,7 +152,7 @@ class Recordings:
             tuple(self._count(number, len(poses), reader.ended) for number, reader in enumerate(readers)),
             sum(pose is None for pose in poses) - unusable, unusable, forwards.problem,
             sum(pose is not None and not pose.accepted.any() for pose in poses),
-            dict(found), time.perf_counter() - began,
+            dict(found), time.perf_counter() - began, light_advice(shadows),
         )  # fmt: skip
 
     def spread_labels(self, setup: TrackingSetup, count: int = MOST_PICTURES) -> list[list[np.ndarray]]:
@@ -278,6 +282,13 @@ def _findings(
     if len(kinds) > 1 and not all(NO_HAND in each for each in kinds):
         kinds = [each - {NO_HAND} for each in kinds]
     return tuple(sorted(set().union(*kinds)))
+
+
+def _shadows(pictures: Sequence[np.ndarray], labels: Sequence[np.ndarray]) -> list[float]:
+    """Of the pictures in which a glove is seen."""
+    both = zip(pictures, labels, strict=True)
+    shares = [shadowed(picture, label) for picture, label in both if picture.ndim == 3]
+    return [share for share in shares if share is not None]
 
 
 def _source(file: Path) -> VideoFilePictures | LabelFilePictures:

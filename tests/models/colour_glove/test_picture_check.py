@@ -8,14 +8,28 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lit_glove import HARD, SOFT, LitGlove, a_light, free_motion, other_camera
+from worn_glove import family
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import PoseDatabase, palm_centre
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
-from glovecal_models.colour_glove.pattern import Pattern, glove_pattern
+from glovecal_models.colour_glove.pattern import (
+    PRINTED_SRGB,
+    Pattern,
+    encoded_light,
+    glove_pattern,
+    linear_light,
+)
 from glovecal_models.colour_glove.photograph import hand_motion
-from glovecal_models.colour_glove.pictures.picture_check import KINDS, Finding, PictureCheck
+from glovecal_models.colour_glove.pictures.picture_check import (
+    KINDS,
+    Finding,
+    PictureCheck,
+    light_advice,
+    shadowed,
+)
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput
@@ -147,3 +161,31 @@ def test_what_is_no_picture_is_refused(check):
     for wrong in (labels[:20], labels.astype(int)):
         with pytest.raises(BadInput, match="labels"):
             check.findings(picture, wrong)
+
+
+@pytest.mark.parametrize("strength", [0.15, 0.6, 1.0])
+def test_what_is_in_shadow_does_not_depend_on_how_bright_the_room_is(strength: float) -> None:
+    """Of each colour the left part has a fifth of the light on the right one."""
+    labels = np.tile(np.repeat(np.arange(1, 11, dtype=np.uint8), 20), (200, 1)).T.copy()
+    light = linear_light(PRINTED_SRGB[:, ::-1])[labels - 1] * strength
+    picture = encoded_light(light)
+    assert shadowed(picture, labels) == pytest.approx(0.0, abs=0.02)
+    light[:, :60] *= 0.2
+    assert shadowed(encoded_light(light), labels) == pytest.approx(0.3, abs=0.03)
+    assert shadowed(picture, np.zeros_like(labels)) is None
+
+
+@pytest.mark.parametrize(("kind", "advised"), [(SOFT, False), (HARD, True)])
+def test_light_from_two_lamps_alone_is_advised_against(kind: str, advised: bool) -> None:
+    """On gloves of seeds that the limit was not chosen on, by another program's pictures."""
+    shares = []
+    for number, glove in enumerate(family(2, 9300)):
+        room = LitGlove(glove, other_camera(1), a_light(kind, 9300 + number), 9300 + number)
+        for index, moment in enumerate(zip(*free_motion(12.0, 0.5, 9300 + number), strict=True)):
+            picture, truth = room.picture(*moment, index)
+            share = shadowed(picture, truth)
+            shares += [] if share is None else [share]
+    said = light_advice(shares)
+    assert bool(said) == advised, f"{np.mean(shares):.2f} in shadow"
+    assert not advised or "Light it from all sides" in said
+    assert light_advice(shares[:5]) == ""

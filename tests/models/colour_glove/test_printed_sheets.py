@@ -196,3 +196,20 @@ def test_what_cannot_be_printed_is_refused() -> None:
         CalibrationBoard(0)
     with pytest.raises(BadInput, match="12 colours; 10 can"):
         glove_sheets(HANDS["assumed"], glove_pattern(HANDS["assumed"], colours=12), "a4")
+
+
+@pytest.mark.parametrize("skin", HANDS.values(), ids=HANDS)
+def test_the_wrists_crease_is_on_both_pieces_and_the_hem_is_told(skin: HandSkin, tmp_path: Path) -> None:
+    """Who wears the glove has to see where it belongs: aside, it costs degrees."""
+    for piece in pieces_of(skin):
+        line = piece.crease_mm
+        across = np.ptp(line.reshape(-1, 2)[:, 0])
+        assert np.linalg.norm(line[:, 0] - line[:, 1], axis=1).sum() == pytest.approx(across, rel=0.1)
+        assert across > 0.4 * skin.skeleton.dimensions.sizes_mm["hand_breadth"]
+        assert piece.hem_mm == pytest.approx(0.07 * skin.skeleton.dimensions.hand_length_mm, abs=1.0)
+    sheets = glove_sheets(skin, printed_pattern(), "letter")
+    file = write_sheets(tmp_path, "glove", sheets[:1])[0]
+    document = pypdfium2.PdfDocument(file)
+    text = document[0].get_textpage().get_text_range()
+    document.close()
+    assert f"the hem {piece.hem_mm:.0f} mm behind it" in " ".join(text.split())

@@ -21,7 +21,7 @@ import numpy as np
 
 from glovecal_models.colour_glove.crop import Window, glove_window, tiny_image
 from glovecal_models.colour_glove.lookup import Neighbours, PoseLookup
-from glovecal_models.colour_glove.pattern import COLOURS, PATCHES
+from glovecal_models.colour_glove.pattern import COLOURS, PATCHES, PRINTED_SRGB, linear_light
 from glovecal_models.errors import BadInput
 
 STRANGE_PX2 = 8.0
@@ -52,6 +52,12 @@ MOST_ON_EDGE = 1 / 80
 """Of the picture's width: pixels of the glove that lie on its edge."""
 SURPLUS_PX2 = 6.0
 """By how much a hand in this glove may be farther from the database than its entries are from each other."""
+SHADOWED = 0.35
+"""Of the light on the best lit tenth of the glove: cloth with less is in shadow."""
+MOST_SHADOWED = 0.25
+"""Of the glove, over many pictures: rooms with light from all sides have 0.08, with two lamps alone 0.32, and
+half as many colours again are mistaken there (tests/simulated/lit_glove.py, seeds 500 to 507)."""
+_FEWEST_LIT = 10
 _CLIPPED_LEVEL = 254
 _BRIGHT_PERCENT = 95
 _JOINED, _FILLED = 0.06, 0.2
@@ -141,10 +147,7 @@ class PictureCheck:
         Causes hide what follows from them: of a picture too bright for its colours nothing else is said.
         Empty where all is well. Raises BadInput for arrays that do not fit.
         """
-        if picture.ndim != 3 or picture.shape[2] != 3 or picture.dtype != np.uint8:
-            raise BadInput(f"a picture is (H, W, 3) uint8, not {picture.shape} {picture.dtype}")
-        if labels.shape != picture.shape[:2] or labels.dtype != np.uint8:
-            raise BadInput(f"labels {labels.shape} {labels.dtype} of a picture {picture.shape}")
+        _require_alike(picture, labels)
         least = int(np.ceil(LEAST_GLOVE * labels.size))
         count = int(np.count_nonzero(labels))
         exposure = _exposure(picture, labels, seen=count >= least)
@@ -212,6 +215,40 @@ class PictureCheck:
             found = self.lookup.neighbours(np.array(images[entry]), 2)
             nearest.extend(found.distances[found.entries != entry][:1])
         return SURPLUS_PX2 + (float(np.percentile(nearest, _OF_ENTRIES_PERCENT)) if nearest else 0.0)
+
+
+def shadowed(picture: np.ndarray, labels: np.ndarray) -> float | None:
+    """Share of the glove that is in shadow, 0 to 1; None where no glove is seen.
+
+    The light on the cloth is what a pixel sends back over what its printed colour does (linear light, in the
+    channel that this colour sends back most of). Raises BadInput for arrays that do not fit.
+    """
+    _require_alike(picture, labels)
+    glove = labels[::2, ::2] > 0
+    if not glove.any():
+        return None
+    inks = linear_light(PRINTED_SRGB[:, ::-1])[labels[::2, ::2][glove].astype(int) - 1]
+    strongest = inks.argmax(axis=1)
+    pixels = np.arange(len(inks))
+    light = linear_light(picture[::2, ::2][glove])[pixels, strongest] / inks[pixels, strongest]
+    return float(np.mean(light < SHADOWED * np.percentile(light, 90)))
+
+
+def light_advice(shares: Sequence[float]) -> str:
+    """What to change of the light, by what ``shadowed`` said of many pictures; empty where it will do."""
+    if len(shares) < _FEWEST_LIT or (mean := float(np.mean(shares))) <= MOST_SHADOWED:
+        return ""
+    return (
+        f"{mean:.0%} of the glove is in shadow on average (at most {MOST_SHADOWED:.0%} is well): colours are "
+        "mistaken there. Light it from all sides, by a second lamp or against a white wall."
+    )
+
+
+def _require_alike(picture: np.ndarray, labels: np.ndarray) -> None:
+    if picture.ndim != 3 or picture.shape[2] != 3 or picture.dtype != np.uint8:
+        raise BadInput(f"a picture is (H, W, 3) uint8, not {picture.shape} {picture.dtype}")
+    if labels.shape != picture.shape[:2] or labels.dtype != np.uint8:
+        raise BadInput(f"labels {labels.shape} {labels.dtype} of a picture {picture.shape}")
 
 
 def _exposure(picture: np.ndarray, labels: np.ndarray, *, seen: bool) -> Finding | None:

@@ -79,6 +79,25 @@ class FlatPiece:
         return [self.points_mm[loop] for loop in borders(self.triangles[self.patch == patch])]
 
     @property
+    def hem_mm(self) -> float:
+        """How far the opening lies behind the wrist's crease."""
+        return -float(self.surface_mm[:, 0].min())
+
+    @property
+    def crease_mm(self) -> np.ndarray:
+        """(K, 2, 2): the wrist's crease, as pieces of a line; where the skin has x = 0."""
+        height, found = self.surface_mm[:, 0], []
+        for corners in self.triangles[np.ptp(np.sign(height[self.triangles]), axis=1) == 2]:
+            ends = [
+                self.points_mm[a]
+                + (self.points_mm[b] - self.points_mm[a]) * height[a] / (height[a] - height[b])
+                for a, b in zip(corners, np.roll(corners, -1), strict=True)
+                if height[a] * height[b] < 0
+            ]
+            found.append(ends)
+        return np.array(found).reshape(-1, 2, 2)
+
+    @property
     def stretch(self) -> np.ndarray:
         """(E,) length of each edge on the sheet over its length on the skin."""
         pairs = np.concatenate(

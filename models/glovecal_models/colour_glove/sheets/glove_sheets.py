@@ -165,6 +165,9 @@ def _draw(sheet: Sheet, marked: _MarkedPiece, pattern: Pattern, shift: np.ndarra
     for line in marked.cut_mm:
         sheet.shape([line + shift], line=GREY, width_mm=0.3, within=room, layer=4)
     sheet.shape([piece.outline_mm + shift], line="black", width_mm=0.35, dashed=True, within=room, layer=4)
+    for ends in piece.crease_mm + shift:
+        if _inside(ends[0], room) and _inside(ends[1], room):
+            sheet.line(ends, width_mm=0.4)
     for letter, place, outwards in marked.marks:
         ends = np.array([place, place + SEAM_ALLOWANCE_MM * outwards]) + shift
         if _inside(ends[0], room) and _inside(ends[1], room):
@@ -238,7 +241,8 @@ def _overview(pieces: list[_MarkedPiece], skin: HandSkin, pattern: Pattern, pape
     y = top + rows * 6.0 + 4.0
     for heading, lines in _INSTRUCTIONS:
         sheet.text((room.left, y), heading, size_mm=3.0, bold=True, anchor="left top")
-        sheet.text((room.left + 16.0, y), lines.format(pages=pages), size_mm=3.0, anchor="left top")
+        said = lines.format(pages=pages, hem_mm=pieces[0].piece.hem_mm)
+        sheet.text((room.left + 16.0, y), said, size_mm=3.0, anchor="left top")
         y += 4.3 * (lines.count("\n") + 1) + 2.5
     return sheet
 
@@ -267,6 +271,11 @@ _INSTRUCTIONS = (
         "Paint",
         "Pull a plain white glove over a card in the shape of the hand. Trace the lines of patches.pdf\n"
         "and paint each patch with matt textile paint in the colour of its number.",
+    ),
+    (
+        "Wear",
+        "The black line lies in the crease of the wrist, the hem {hem_mm:.0f} mm behind it, the seams along\n"
+        "the fingers' sides, the tips without folds. A glove that lies aside costs degrees: look each time.",
     ),
     (
         "Check",

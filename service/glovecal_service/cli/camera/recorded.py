@@ -90,6 +90,8 @@ def _print(found: TrackedRecordings, file: Path) -> None:
     )
     for kind, count in found.findings.items():
         out.print(f"{kind}: {count} frames, no rotation is accepted of them.")
+    if found.advice:
+        out.print(found.advice)
     columns = {
         "rotation": "rotation",
         "accepted": "accepted, % of frames",
@@ -145,6 +147,7 @@ def _document(found: TrackedRecordings, file: Path) -> dict[str, Any]:
         "unusable": found.unusable,
         "problem": found.problem,
         "findings": found.findings,
+        "advice": found.advice,
         "seconds": found.took_s,
         "accepted_share": float(said.accepted.mean()),
         "rotations": _rotations(found),

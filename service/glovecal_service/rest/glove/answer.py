@@ -223,6 +223,7 @@ class CameraHealthView(Row):
     findings_counted: dict[str, int] = Field(
         description="Pictures in which each kind was found; five a second are checked."
     )
+    advice: str = Field(description="What to change of the light; empty where it will do.")
     pose_rate_hz: float
     latency_ms: Percentiles | None = Field(
         description="From the picture's stamp to publication, last 300 poses. A camera stamps a picture when "

@@ -145,7 +145,7 @@ class CameraCard:
         told = [
             f"{as_sentence(kind)[:-1]}: {'now; ' if kind in now else ''}in {count} of the pictures checked."
             for kind, count in counted.items()
-        ]
+        ] + ([health.advice] if health is not None and health.advice else [])
         if told == getattr(self, "_told", []):
             return
         self._told = told
