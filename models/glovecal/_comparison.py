@@ -13,10 +13,15 @@ from glovecal_models.takes.take import Take
 
 
 def compare(
-    model: CalibrationModel, takes: Take | Iterable[Take], *, hand_length_mm: float | None = None
+    model: CalibrationModel,
+    takes: Take | Iterable[Take],
+    *,
+    offline: bool = False,
+    hand_length_mm: float | None = None,
 ) -> Comparison:
     """Hold a model against takes with reference angles, best such as it was not trained on.
 
+    ``offline``: angles are estimated with both directions of time, with the live error beside them.
     ``hand_length_mm``: from the wrist crease to the tip of the middle finger, for errors of fingertips.
     Raises BadInput when nothing was measured, when the takes are of another layout, or for a length that no
     hand has.
@@ -28,7 +33,7 @@ def compare(
     hand = None if length is None else HandDimensions.from_measured(length)
     with library_call():
         inner, every = inner_model(model), takes_in(takes)
-        return about(compare_inner(inner, every, dimensions=hand), every, model)
+        return about(compare_inner(inner, every, offline=offline, dimensions=hand), every, model)
 
 
 def where(model: CalibrationModel, takes: Take | Iterable[Take], *, seed: int = 0) -> WhereItFails:

@@ -78,18 +78,20 @@ class Angles(Shown):
         return plotted(Chart(draw, 7.0, 3.3, "Angles over time."), ax)
 
 
-def predict(model: CalibrationModel, readings: Take | np.ndarray) -> Angles:
+def predict(model: CalibrationModel, readings: Take | np.ndarray, *, offline: bool = False) -> Angles:
     """Angles of a take, effects with a memory started at its first frame; or of readings alone, (N, S) in the
     order of the layout's sensors, without effects.
 
-    Raises BadInput on a wrong shape, on readings that are not finite, and when the take lacks a sensor.
+    ``offline``: a take is estimated with both directions of time, not as it was live. Raises BadInput on a
+    wrong shape, on readings that are not finite, and when the take lacks a sensor.
     """
+    from glovecal_models.calibration.offline import OfflinePredictor
     from glovecal_models.calibration.predictor import GlovePredictor
     from glovecal_models.calibration.samples import require_layout
 
     inner = inner_model(model)
     with library_call():
-        predictor = GlovePredictor(inner)
+        predictor = OfflinePredictor(inner) if offline else GlovePredictor(inner)
         if not isinstance(readings, Take):
             found = predictor.predict(np.asarray(readings))
             return Angles(predictor.rotations, np.arange(len(found.mean), dtype=float), found)

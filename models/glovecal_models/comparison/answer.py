@@ -143,6 +143,8 @@ class Comparison(OnSeenTakes):
     """Measured frames, by rotation, that are not compared: faulty sensors, repeated frames."""
     camera_ranges: Sequence[CoveredRange] = ()
     """Of rotations that a camera measured: angles outside of these ranges were not compared."""
+    live: RotationErrors | None = None
+    """Overall of live angles, where all else is of angles estimated offline; null: all is of live ones."""
     rmse_unseen_wearing_deg: float | None = None
     """Of the takes whose wearing the model has not seen; null: there are none, or unknown."""
     sentences: Sequence[str] = ()
@@ -151,7 +153,18 @@ class Comparison(OnSeenTakes):
     def __post_init__(self) -> None:
         unseen = self.unseen_wearing
         object.__setattr__(self, "rmse_unseen_wearing_deg", None if unseen is None else unseen.rmse_deg)
-        object.__setattr__(self, "sentences", [*self._of_wearings(), *self._of_a_camera()])
+        object.__setattr__(
+            self, "sentences", [*self._of_offline(), *self._of_wearings(), *self._of_a_camera()]
+        )
+
+    def _of_offline(self) -> list[str]:
+        """What both directions of time save."""
+        if self.live is None:
+            return []
+        return [
+            f"Estimated offline, with both directions of time: {self.overall.rmse_deg:.2f} degrees, "
+            f"live {self.live.rmse_deg:.2f}."
+        ]
 
     def _of_wearings(self) -> list[str]:
         """The error in wearings not seen in training, then in those seen."""
@@ -233,6 +246,7 @@ class Comparison(OnSeenTakes):
         claimed = f"{100 * overall.coverage:.0f} % of errors within one claimed SD (expected: 68 %)"
         return [
             Fact("Size", size),
+            *(Fact("Offline", sentence) for sentence in self._of_offline()),
             Fact("Wearings", " ".join(wearings)) if wearings else Fact("Claimed SD", claimed),
         ]
 

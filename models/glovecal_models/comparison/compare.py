@@ -48,22 +48,30 @@ FEWEST_ROWS_OF_A_REGION = 30
 
 
 def compare(
-    model: CalibrationModel, takes: Sequence[Take], *, dimensions: HandDimensions | None = None
+    model: CalibrationModel,
+    takes: Sequence[Take],
+    *,
+    offline: bool = False,
+    dimensions: HandDimensions | None = None,
 ) -> Comparison:
     """Errors of ``model`` on ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured.
 
-    ``dimensions`` of the subject's hand, for the errors of fingertips.
+    ``offline``: of angles estimated with both directions of time, beside those of live ones; ``dimensions``
+    of the subject's hand, for the errors of fingertips.
     """
-    return summed_up(residuals(model, takes), dimensions=dimensions)
+    live = residuals(model, takes) if offline else None
+    return summed_up(residuals(model, takes, offline=offline), live=live, dimensions=dimensions)
 
 
 def summed_up(
     found: Residuals,
     noise: Mapping[str, RotationNoise] | None = None,
     *,
+    live: Residuals | None = None,
     dimensions: HandDimensions | None = None,
 ) -> Comparison:
-    """Residuals as numbers: over all, each rotation, each pose, fingertips. ``noise`` spares its time."""
+    """Residuals as numbers: over all, each rotation, each pose, fingertips. ``noise`` spares its time;
+    ``live`` are those of live angles where ``found`` are offline."""
     noise = rotation_noise(found) if noise is None else noise
     error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
     measured = found.measured_rotations
@@ -86,6 +94,7 @@ def summed_up(
         seen_wearings=_wearings_where(found, is_seen=True),
         excluded=found.excluded,
         camera_ranges=covered_ranges([item.take for item in found.takes], measured),
+        live=None if live is None else _of_all(live),
     )
 
 
@@ -101,8 +110,12 @@ def _errors_where(found: Residuals, *, is_seen: bool) -> RotationErrors | None:
     chosen = tuple(item for item in found.takes if item.has_seen_wearing is is_seen)
     if not any(np.isfinite(item.error).any() for item in chosen):
         return None
-    part = Residuals(found.rotations, chosen)
-    return _errors(part.stacked("error"), part.stacked("sd"), part.stacked("measured"), None)
+    return _of_all(Residuals(found.rotations, chosen))
+
+
+def _of_all(found: Residuals) -> RotationErrors:
+    """Overall, without a floor."""
+    return _errors(found.stacked("error"), found.stacked("sd"), found.stacked("measured"), None)
 
 
 def _poses(take: Take) -> np.ndarray:

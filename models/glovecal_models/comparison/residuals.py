@@ -11,6 +11,7 @@ from math import comb
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.offline import OfflinePredictor
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.effects.base.effect import RepairEffect
@@ -90,9 +91,12 @@ class Residuals:
         return np.concatenate([getattr(item, name) for item in self.takes])
 
 
-def residuals(model: CalibrationModel, takes: Sequence[Take]) -> Residuals:
-    """Predict every frame of ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured."""
-    predictor = GlovePredictor(model)
+def residuals(model: CalibrationModel, takes: Sequence[Take], *, offline: bool = False) -> Residuals:
+    """Predict every frame of ``takes``, as a live glove's or ``offline``, with both directions of time.
+
+    Raises LayoutMismatch, and BadInput when nothing was measured.
+    """
+    predictor = OfflinePredictor(model) if offline else GlovePredictor(model)
     names = predictor.rotations
     found = []
     for take in takes:

@@ -13,6 +13,7 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, columnless_effects
 from glovecal_models.calibration.effect_fit import fit_with_effects
+from glovecal_models.calibration.learned_lead import with_leads
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
@@ -265,6 +266,7 @@ def add_effect(
     if isinstance(effect, RepairEffect) and effect.live is not None:
         fresh, live = _acting_live(model, takes, has, fresh, effect.live, cancelled)
         wanted = (*(item for item in has if item.name != name), _joined(has, fresh))
+    fit = with_leads(fit, prepared, settings)
     evidence = _evidence(before, after, chosen, control_share) | dict(live.evidence if live else {})
     effects = [*kept_lanes(model.effects, chosen), *fit.effects, *columnless_effects(wanted, model.effects)]
     effects = [replace(item, evidence=evidence) if item.name == name else item for item in effects]

@@ -13,6 +13,7 @@ import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, columnless_effects
 from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
+from glovecal_models.calibration.learned_lead import with_leads
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors, left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
@@ -186,6 +187,7 @@ def remove_effect(
     every = trained_rotations(model)
     prepared = PreparedTakes.of(repaired_takes(takes, wanted), model.layout)
     fit = fit_with_effects(prepared, every, wanted, settings, cancelled=cancelled)
+    fit = with_leads(fit, prepared, settings)
     errors = held_out_errors(prepared, every, wanted, settings, optima=fit.optima, cancelled=cancelled)
     effects = [*fit.effects, *columnless_effects(wanted, model.effects)]
     lineage = Lineage(parent_id, tuple(take_hashes))

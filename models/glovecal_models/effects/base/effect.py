@@ -68,6 +68,9 @@ class Dynamics(ABC):
 
     has_memory: bool = False
     """Whether its columns depend on earlier frames."""
+    is_late: bool = False
+    """Whether a reading comes late by it, so that its columns lead; a recording is led by its smoothed motion
+    instead (``calibration.offline``)."""
 
     @property
     def needs_time(self) -> bool:

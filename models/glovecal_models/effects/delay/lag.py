@@ -60,6 +60,7 @@ class Lag(ArrayStateEffect):
     )
     shape = Shape((Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms", tried=TAU_S),))
     comparison = LagComparison()
+    is_late = True
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return self.comparison.not_applicable_reason(takes)
