@@ -40,6 +40,8 @@ def test_nothing_is_left_to_gain_on_a_clean_glove() -> None:
     assert found.overall is not None
     assert found.overall.high_share < CEILING_LIMITS.none_below
     assert ceiling_sentence(found).startswith("Nothing is left to gain")
+    assert 0.5 < found.overall.offline_deg / found.overall.rmse_deg < 0.95
+    assert f"both directions of time, {found.overall.offline_deg:.2f} degrees" in ceiling_sentence(found)
     assert not_left_to_gain(found)
 
 
@@ -99,9 +101,9 @@ def test_flipping_signs_of_whole_takes() -> None:
 
 def test_the_verdict_follows_the_interval() -> None:
     wide, one = np.array([3.0, -3.0] * 4), np.full(8, 0.5)
-    steady, nothing = Gain.of(one, 1.0, 0), Gain.of(0.001 * wide, 1.0, 0)
+    steady, nothing = Gain.of(one, 1.0, 1.0, 0), Gain.of(0.001 * wide, 1.0, 1.0, 0)
     assert verdict_of(steady, {"a": steady}, CEILING_LIMITS) == "gain"
     assert verdict_of(nothing, {"a": nothing}, CEILING_LIMITS) == "none"
     assert verdict_of(nothing, {"a": nothing, "b": steady}, CEILING_LIMITS) == "gain"
-    unsure = Gain.of(wide, 1.0, 0)
+    unsure = Gain.of(wide, 1.0, 1.0, 0)
     assert verdict_of(unsure, {"a": unsure}, CEILING_LIMITS) == "undecided"

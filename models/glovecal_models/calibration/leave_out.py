@@ -29,6 +29,7 @@ from glovecal_models.calibration.folds import (
     pieces,
     wearing_groups,
 )
+from glovecal_models.calibration.learned_lead import offline_errors_of, with_leads
 from glovecal_models.calibration.prepared_takes import OwnSignal, PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings, left_out_settings
 from glovecal_models.calibration.unseen_wearing import LeftOutWearing
@@ -61,6 +62,14 @@ class HeldOutErrors:
     def overall_deg(self) -> float:
         """RMSE over all rotations and frames."""
         return float(np.sqrt(sum(self.square.values()) / max(sum(self.count.values()), 1)))
+
+
+class TakeErrors(NamedTuple):
+    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured."""
+
+    live: list[np.ndarray]
+    offline: list[np.ndarray]
+    """With both directions of time."""
 
 
 class FitWithout(NamedTuple):
@@ -169,13 +178,13 @@ def held_out_take_errors(
     optima: Optima = (),
     cancelled: Cancel | None = None,
     report: Report | None = None,
-) -> list[np.ndarray]:
-    """For each take (N, R), predicted minus measured, degrees; NaN where nothing was measured.
-
-    Whole takes are left out in so many ``folds``. ``optima`` as in ``fits_without``. Raises NotTrainable,
+) -> TakeErrors:
+    """Whole takes are left out in so many ``folds``. ``optima`` as in ``fits_without``. Raises NotTrainable,
     Cancelled.
     """
-    found, parts = [np.empty((0, 0))] * len(takes.takes), folds_over_takes(np.arange(len(takes.takes)), folds)
+    count = len(takes.takes)
+    parts = folds_over_takes(np.arange(count), folds)
+    found = TakeErrors([np.empty((0, 0))] * count, [np.empty((0, 0))] * count)
 
     def before_each(at: int) -> None:
         if report:
@@ -186,8 +195,10 @@ def held_out_take_errors(
         optima=optima, is_optional=False, before_each=before_each, cancelled=cancelled,
     ):  # fmt: skip
         held = np.flatnonzero(parts[number].held_out).tolist()
-        for at, errors in zip(held, frame_errors_of(fit, left, rotations, settings), strict=True):
-            found[at] = errors
+        fit = with_leads(fit, takes.some(np.flatnonzero(~parts[number].held_out).tolist()), settings)
+        for errors, of in zip(found, (frame_errors_of, offline_errors_of), strict=True):
+            for at, part in zip(held, of(fit, left, rotations, settings), strict=True):
+                errors[at] = part
     return found
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from glovecal_models.calibration.effect_fit import optima_of
-from glovecal_models.calibration.leave_out import held_out_take_errors
+from glovecal_models.calibration.leave_out import TakeErrors, held_out_take_errors
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import (
@@ -94,7 +94,7 @@ def black_box_ceiling(
 def _of_errors(
     prepared: PreparedTakes,
     names: Sequence[str],
-    errors: Sequence[np.ndarray],
+    errors: TakeErrors,
     seed: int,
     limits: CeilingLimits,
     cancelled: Cancel | None,
@@ -113,11 +113,14 @@ def _of_errors(
             scale = np.concatenate(prepared.readings).std(axis=0)
             scale = np.where(scale > 0, scale, 1.0)
             columns[own] = recorded_columns(prepared.takes, prepared.readings, own, scale)
-        rows = RotationRows.of(columns[own], prepared, [error[:, number] for error in errors], order, own)
+        live = [error[:, number] for error in errors.live]
+        rows = RotationRows.of(columns[own], prepared, live, order, own)
         if rows is not None:
-            boxes[name] = _boxes(rows, seed)
+            offline = np.concatenate([error[:, number] for error in errors.offline])
+            boxes[name] = replace(_boxes(rows, seed), offline_square=float(np.nanmean(offline**2)))
     if not boxes:
-        return _undecided(f"no rotation was measured in {limits.fewest_takes} takes", len(errors), limits)
+        why = f"no rotation was measured in {limits.fewest_takes} takes"
+        return _undecided(why, len(prepared.takes), limits)
     return _summed_up(boxes, prepared, seed, limits)
 
 
@@ -132,6 +135,8 @@ class _Boxes:
     """Rise of the mean square when a group is exchanged between takes."""
     by_take_share: float
     """Of the mean square, that changes from take to take."""
+    offline_square: float = np.nan
+    """Mean square of what is left with both directions of time, without a box."""
 
 
 def _boxes(rows: RotationRows, seed: int) -> _Boxes:
@@ -183,9 +188,15 @@ def _by_take(rows: RotationRows) -> float:
 def _summed_up(
     boxes: dict[str, _Boxes], prepared: PreparedTakes, seed: int, limits: CeilingLimits
 ) -> Ceiling:
-    rotations = {name: Gain.of(item.saved, item.mean_square, seed) for name, item in boxes.items()}
+    rotations = {
+        name: Gain.of(item.saved, item.mean_square, item.offline_square, seed) for name, item in boxes.items()
+    }
     saved = np.mean([item.saved for item in boxes.values()], axis=0)
-    overall = Gain.of(saved, float(np.mean([item.mean_square for item in boxes.values()])), seed)
+    live, offline = (
+        float(np.mean([getattr(item, name) for item in boxes.values()]))
+        for name in ("mean_square", "offline_square")
+    )
+    overall = Gain.of(saved, live, offline, seed)
     verdict = verdict_of(overall, rotations, limits)
     worst = max(boxes, key=lambda name: boxes[name].by_take_share)
     changing = boxes[worst].by_take_share

@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 from glovecal_models.limit import limit
 
 Verdict = Literal["gain", "none", "undecided"]
-RECIPE = 2
+RECIPE = 3
 """Rises when the same model and takes get another answer: results kept of an earlier one are not used."""
 EXACT_FLIPS = 14
 RANDOM_FLIPS = 20000
@@ -71,6 +71,8 @@ class Gain:
     """With the box, or of the model where the box is no better."""
     lowest_deg: float
     """With the upper 95 % bound of what the box gains."""
+    offline_deg: float
+    """Of the model on the same quarters with both directions of time: the limit of recordings."""
     share: float
     """Of the RMSE, that the box takes off."""
     low_share: float
@@ -80,7 +82,7 @@ class Gain:
     """One-sided, by flipping the sign of whole takes."""
 
     @classmethod
-    def of(cls, saved: np.ndarray, mean_square: float, seed: int) -> Gain:
+    def of(cls, saved: np.ndarray, mean_square: float, offline_square: float, seed: int) -> Gain:
         """``saved`` (takes,): of each take, degrees squared; their mean is what is saved of the square."""
         count, mean = len(saved), float(saved.mean())
         error = float(saved.std(ddof=1)) / np.sqrt(count) * float(stdtrit(count - 1, 0.975))
@@ -88,7 +90,8 @@ class Gain:
         low, mid, high = (_share(value / mean_square) for value in (mean - error, mean, mean + error))
         rmse = float(np.sqrt(mean_square))
         lowest = rmse * (1 - max(high, 0.0))
-        return cls(rmse, float(best), lowest, mid, low, high, sign_flip_p_value(saved, seed))
+        offline = float(np.sqrt(offline_square))
+        return cls(rmse, float(best), lowest, offline, mid, low, high, sign_flip_p_value(saved, seed))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,19 @@ ERROR = "error on left-out quarters of the takes"
 
 
 def ceiling_sentence(found: Ceiling) -> str:
-    """The verdict with its interval, and what it rests on."""
+    """The verdict with its interval and what it rests on; then the limit of recordings."""
+    gain = found.overall
+    return _live_sentence(found) if gain is None else f"{_live_sentence(found)} {_offline(gain)}"
+
+
+def _offline(gain: Gain) -> str:
+    return (
+        "Live poses know the past alone; offline, with both directions of time,"
+        f" {gain.offline_deg:.2f} degrees are left."
+    )
+
+
+def _live_sentence(found: Ceiling) -> str:
     gain = found.overall
     if found.verdict == "gain" and gain is not None:
         where = ", ".join(found.gaining[:MOST_NAMED])
@@ -45,7 +57,13 @@ def left_to_gain(found: Ceiling) -> LeftToGain:
 
 def _possible(gain: Gain) -> PossibleGain:
     return PossibleGain(
-        gain.rmse_deg, gain.ceiling_deg, gain.lowest_deg, gain.low_share, gain.high_share, gain.p_value
+        gain.rmse_deg,
+        gain.ceiling_deg,
+        gain.lowest_deg,
+        gain.low_share,
+        gain.high_share,
+        gain.p_value,
+        gain.offline_deg,
     )
 
 
