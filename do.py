@@ -20,6 +20,8 @@
                             study ablation: what every rule of the diagnosis is worth (hours; --minutes N);
                             study new-person: error against seconds of own data, other people as prior
                             (needs the shared recordings; a few minutes);
+                            study offline: recordings estimated with both directions of time, against live
+                            (half an hour);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (an hour);
@@ -255,6 +257,8 @@ def study(arguments: list[str]) -> int:
         return run("python", "tests/study/active_sampling.py", *arguments[1:], beside=SIMULATED)
     if arguments[:1] == ["new-person"]:
         return run("python", "tests/study/new_person.py", *arguments[1:])
+    if arguments[:1] == ["offline"]:
+        return run("python", "tests/study/offline_study.py", *arguments[1:])
     if arguments[:1] == ["ablation"]:
         return run("python", "tests/study/ablation.py", *arguments[1:])
     if arguments[:1] == ["demos"]:
