@@ -14,6 +14,7 @@ import numpy as np
 
 from glovecal_models.calibration.artifact import load
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.offline import OfflinePredictor
 from glovecal_models.calibration.predictor import FAULTY_SENSOR, TOO_UNCERTAIN, GlovePredictor
 from glovecal_models.calibration.samples import require_layout
 from glovecal_models.errors import BadInput
@@ -31,10 +32,13 @@ from glovecal_service.exports.resampling import Resampling
 from glovecal_service.store.records import SubjectRecord
 
 
-def motion_of(take: Take, model: CalibrationModel | None, skeleton: Skeleton, label: str) -> HandMotion:
+def motion_of(
+    take: Take, model: CalibrationModel | None, skeleton: Skeleton, label: str, *, offline: bool = False
+) -> HandMotion:
     """From where the take was asked for; its pre-roll only tells effects with a memory where they stand.
 
-    Angles that are too uncertain, or read from a sensor that fails, are NaN. Raises LayoutMismatch.
+    ``offline``: estimated with both directions of time. Angles that are too uncertain, or read from a sensor
+    that fails, are NaN. Raises LayoutMismatch.
     """
     asked = np.ones(len(take.time_s), bool) if take.begins_s is None else take.time_s >= take.begins_s
     count = int(asked.sum())
@@ -43,7 +47,7 @@ def motion_of(take: Take, model: CalibrationModel | None, skeleton: Skeleton, la
     flags = np.empty((count, 0), np.uint8)
     if model is not None:
         require_layout(take, model.layout)
-        predictor = GlovePredictor(model)
+        predictor = OfflinePredictor(model) if offline else GlovePredictor(model)
         columns = [take.sensors.index(name) for name in model.layout.sensors]
         found = predictor.predict_take(take.time_s, take.readings[:, columns], take.context, take.wearing)
         unusable = (found.flags & (TOO_UNCERTAIN | FAULTY_SENSOR)) > 0
@@ -96,6 +100,8 @@ class HandTake:
     """The take's own reference angles are wanted."""
     accounting: Mapping[str, Any] | None
     time_code: TimeCode | None = None
+    offline: bool = False
+    """The model's angles are estimated with both directions of time."""
 
     @property
     def label(self) -> str:
@@ -109,8 +115,8 @@ class HandTake:
             found = measured_motion(self.take, self.subject.skeleton(self.hand, palm), self.label)
             return replace(found, notes=notes | self._labelled(found))
         skeleton = self.subject.skeleton(self.hand, "rigid" if model is None else model.palm)
-        found = motion_of(self.take, model, skeleton, self.label)
-        return replace(found, notes=notes | self._labelled(found))
+        found = motion_of(self.take, model, skeleton, self.label, offline=self.offline)
+        return replace(found, notes=notes | {"offline": self.offline} | self._labelled(found))
 
     def _labelled(self, motion: HandMotion) -> dict[str, str]:
         """The time code of the first frame."""

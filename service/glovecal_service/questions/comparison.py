@@ -23,7 +23,8 @@ Found = TypeVar("Found", bound=OnSeenTakes)
 
 
 class ComparisonRequest(StrictBody):
-    pass
+    offline: bool = False
+    """Of angles estimated with both directions of time, as recordings can be; the live error is beside it."""
 
 
 class WhereRequest(StrictBody):
@@ -31,8 +32,8 @@ class WhereRequest(StrictBody):
     """Also compare two models trained on disjoint halves of the training takes."""
 
 
-def _compared(on: WorkOnTakes, _: ComparisonRequest) -> Comparison:
-    return compare(on.loaded, on.takes, dimensions=on.hand)
+def _compared(on: WorkOnTakes, request: ComparisonRequest) -> Comparison:
+    return compare(on.loaded, on.takes, offline=request.offline, dimensions=on.hand)
 
 
 def _failures(on: WorkOnTakes, _: WhereRequest) -> WhereItFails:

@@ -102,6 +102,21 @@ def test_a_page_with_both_models_is_written_beside_the_json(walked, tmp_path):
     assert "exists already" in run("compare", models["raw"]["id"], "--report", page).said
 
 
+def test_a_recording_is_compared_with_both_directions_of_time(walked, tmp_path):
+    run, _, _ = walked
+    id, page = by_method(run)["linear"]["id"], tmp_path / "offline.html"
+    live, offline = (run("compare", id, *more, "--json").json[id] for more in ((), ("--offline",)))
+    assert live["live"] is None
+    assert offline["live"]["rmse_deg"] == live["overall"]["rmse_deg"] != offline["overall"]["rmse_deg"]
+    told = run("compare", id, "--offline", "--report", page)
+    sentence = (
+        f"with both directions of time: {offline['overall']['rmse_deg']:.2f} degrees, "
+        f"live {live['overall']['rmse_deg']:.2f}."
+    )
+    assert sentence in " ".join(told.out.split())
+    assert sentence in " ".join(page.read_text().split())
+
+
 def test_comparing_agrees_with_the_exported_model(walked, tables, tmp_path):
     """The artifact read back in Python, its prediction held against the take's file by hand."""
     run, _, _ = walked

@@ -69,6 +69,12 @@ def test_angles_are_those_of_the_active_model(client: RestClient, tmp_path: Path
         data = read(client.made("/motion", {**body, "models": named}), tmp_path)
         written = np.array(data["R_index"])[:, 1]
         np.testing.assert_allclose(written, series["predicted_deg"], atol=1e-9)
+    offline = np.array(read(client.made("/motion", body | {"offline": True}), tmp_path)["R_index"])[:, 1]
+    live = np.array(data["R_index"])[:, 1]
+    assert np.abs(np.diff(offline, 2)).sum() < np.abs(np.diff(live, 2)).sum()
+    for other in ({"measured": True}, {"content": "raw"}):
+        with pytest.raises(Refused, match="only a model's angles are estimated offline"):
+            client.made("/motion", body | other | {"offline": True})
     joints = read(client.made("/motion", {"takes": [right]}), tmp_path)
     assert len(joints["Markers"]) == 21
     with pytest.raises(Refused, match="no model of ben"):

@@ -47,6 +47,13 @@ def compare(
     model: Models,
     take: HeldOutTakes = None,
     poses: Annotated[bool, typer.Option("--poses", help="Errors of each pose too.")] = False,
+    offline: Annotated[
+        bool,
+        typer.Option(
+            "--offline",
+            help="Of angles estimated with both directions of time, as recordings can be; live ones beside.",
+        ),
+    ] = False,
     ceiling: Ceiling = False,
     report: Report = None,
     overwrite: Overwrite = False,
@@ -54,7 +61,7 @@ def compare(
 ) -> None:
     """Hold models against measurements; several models are shown side by side."""
     names = list(dict.fromkeys(model))
-    results = _asked(COMPARE.kind, names, take, {}, ceiling, report, overwrite, as_json)
+    results = _asked(COMPARE.kind, names, take, {"offline": offline}, ceiling, report, overwrite, as_json)
     if as_json:
         print_json(results)
         return
@@ -111,7 +118,7 @@ def _asked(
         body = {"takes": takes, **more}
         results = {name: service.post(f"/models/{name}/{kind}", body) for name in models}
         # The first of the models is looked at closely, the others stand beside it.
-        asked = {"takes": takes, "beside": models[1:]}
+        asked = {"takes": takes, "beside": models[1:], "offline": more.get("offline", False)}
         page = fetch_report(service, f"/models/{models[0]}/report", asked, report) if report else b""
     if report is not None:
         write_report(report, page, as_json=as_json)

@@ -66,6 +66,13 @@ def motion(
     measured: Annotated[
         bool, typer.Option("--measured", help="The angles that were measured, not those of a model.")
     ] = False,
+    offline: Annotated[
+        bool,
+        typer.Option(
+            "--offline",
+            help="The model's angles estimated with both directions of time, not as they were live.",
+        ),
+    ] = False,
     rate: Annotated[
         float | None, typer.Option(help="Frames a second on even steps; default: the frames' own times.")
     ] = None,
@@ -142,6 +149,7 @@ def motion(
             "hands": hand or [],
             "content": content,
             "measured": measured,
+            "offline": offline,
             "rate_hz": rate,
             "low_pass_hz": low_pass,
             "format": chosen.suffix.removeprefix("."),

@@ -19,7 +19,7 @@ from glovecal_models.comparison.where_it_fails import where_it_fails
 from glovecal_models.improvement.fall.lineage import SIMPLER, simpler_calibrations
 from glovecal_service.questions.body import OfTakes
 from glovecal_service.questions.chosen_takes import takes_for
-from glovecal_service.questions.comparison import COMPARE, WHERE, trained_on
+from glovecal_service.questions.comparison import COMPARE, WHERE, ComparisonRequest, trained_on
 from glovecal_service.questions.model_work import trained_ids
 from glovecal_service.request_types import ModelReference
 from glovecal_service.rest.asking import asked_at_once
@@ -34,7 +34,7 @@ router = APIRouter(prefix="/models", tags=["models"])
 MOST_BESIDE = 7
 
 
-class AgainstBeside(OfTakes):
+class AgainstBeside(OfTakes, ComparisonRequest):
     beside: Annotated[list[ModelReference], Field(max_length=MOST_BESIDE)] = Field(
         default=[], description="Other models, held against the same takes and shown beside this one."
     )
@@ -57,7 +57,8 @@ def report_on_model(
     assert asked.loaded is not None
     assert asked.model is not None
     on = COMPARE.on_takes(store, asked, {})
-    found = residuals(asked.loaded, on.takes)
+    found = residuals(asked.loaded, on.takes, offline=body.offline)
+    live = residuals(asked.loaded, on.takes) if body.offline else None
     noise = rotation_noise(found)
     others = {}
     for reference in body.beside:
@@ -66,7 +67,7 @@ def report_on_model(
     others.pop(asked.model.id, None)
     page = comparison_page(
         asked.loaded,
-        COMPARE.named(store, asked, summed_up(found, noise, dimensions=on.hand)),
+        COMPARE.named(store, asked, summed_up(found, noise, live=live, dimensions=on.hand)),
         WHERE.named(store, where_asked, where_it_fails(found, noise=noise)),
         found,
         noise,

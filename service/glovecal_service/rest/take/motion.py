@@ -83,6 +83,10 @@ class Motion(StrictBody):
     measured: bool = Field(
         False, description="The angles that were measured (the takes' reference), not those of a model."
     )
+    offline: bool = Field(
+        False,
+        description="The model's angles are estimated with both directions of time, not as they were live.",
+    )
     rate_hz: Annotated[FiniteFloat, Field(gt=0, le=FASTEST_HZ)] | None = Field(
         None, description="Frames on even steps of this rate; null: at the frames' own times."
     )
@@ -259,6 +263,8 @@ def _hand(parts: Parts, body: Motion, take: str, model: str | None, hand: Handed
     subject = parts.store.subjects.get(record.subject)
     side = hand or record.known_hand or subject.known_hand
     artifact = chosen = None
+    if body.offline and (body.content == "raw" or body.measured):
+        raise BadInput("only a model's angles are estimated offline; ask for them, or leave offline out")
     if body.content != "raw" and not body.measured:
         chosen = (
             parts.store.models.active(record.subject, record.layout, hand or record.known_hand)
@@ -286,4 +292,5 @@ def _hand(parts: Parts, body: Motion, take: str, model: str | None, hand: Handed
         measured,
         record.accounting,
         record.time_code,
+        body.offline,
     )

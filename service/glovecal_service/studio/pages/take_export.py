@@ -65,6 +65,8 @@ class TakeExport:
                 )
                 self._rate = ui.number("Frames a second", min=1, max=1000, placeholder="as recorded")
                 self._low_pass = ui.number("Low-pass filter, Hz", min=0.1, max=450, placeholder="none")
+            self._offline = ui.checkbox("The model's angles with both directions of time, not as live")
+            self._offline.set_visibility(self._model is not None)
             self._about = ui.label()
             self._onto = TakeOnto(self._studio, formats, self._body, self._tell)
             with ui.element("div").classes("page-acts"):
@@ -94,12 +96,13 @@ class TakeExport:
     def _body(self) -> dict[str, Any]:
         takes = [take for take in (self._own.id, self._other.value) if take]
         measured = self._source.value == "measured"
-        posed = not measured and self._content.value != "raw" and len(takes) == 1
+        is_posed = not measured and self._content.value != "raw"
         return {
             "takes": takes,
-            "models": [self._model] if posed else [],
+            "models": [self._model] if is_posed and len(takes) == 1 else [],
             "content": self._content.value,
             "measured": measured,
+            "offline": self._offline.value and is_posed,
             "format": self._format.value,
             "file_name": self._own.name,
             "rate_hz": self._rate.value,
