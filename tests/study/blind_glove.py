@@ -65,6 +65,8 @@ class BlindGlove:
     wearings: int = 3
     takes_per_wearing: int = 4
     take_s: float = 40.0
+    motion: TakeMotion = "natural"
+    """Of every take."""
     lead_s: float = 0.0
     """So long the glove streams before the reference of each take begins."""
 
@@ -87,6 +89,7 @@ class BlindGlove:
             wearings=self.wearings,
             takes_per_wearing=self.takes_per_wearing,
             take_s=self.lead_s + self.take_s,
+            motions=(self.motion,),
         )
 
     @property

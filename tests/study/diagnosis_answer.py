@@ -22,6 +22,18 @@ def diagnosis_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     return verdict(found) | {"right": names_of(glove), **glove.told()}
 
 
+def told_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_LIMITS) -> dict[str, Any]:
+    """The same with what else a person is told of sensors, the reference and the residual."""
+    found = diagnose(glove.takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
+    return verdict(found) | {
+        "right": names_of(glove),
+        "findings": [item.sentence for item in found.findings],
+        "reference_problems": list(found.reference_problems),
+        "unexplained_residual": found.residual.is_significant,
+        **glove.told(),
+    }
+
+
 def verdict(found: Diagnosis) -> dict[str, Any]:
     """First name, confidence set and ranking of one diagnosis."""
     signatures = list(dict.fromkeys(item.effect for item in found.signature))

@@ -17,13 +17,17 @@ from further_forms import every_form
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES
 from glovecal_models.simulation.causes.form import Cause, Form
-from glovecal_models.simulation.session_plan import FIVE_SENSORS
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, TAKE_MOTIONS
 from glovecal_models.simulation.simulated_hand import ROTATIONS
 
 FLOOR_DEG = 0.77
 """The noise floor of such a glove; sizes are multiples of it."""
 BITS = (8, 10, 12)
 RATES_HZ = (30.0, 60.0, 100.0)
+EVERY_RATE_HZ = (15.0, 30.0, 60.0, 90.0, 120.0)
+"""Of gloves that are sold."""
+MOTIONS = tuple(motion for motion in TAKE_MOTIONS if motion != "palm")
+"""Of gloves without a sensor in the palm, too."""
 NUISANCES: tuple[Nuisance, ...] = get_args(Nuisance)
 BYSTANDERS: tuple[Bystander, ...] = get_args(Bystander)
 CONTEXT_CAUSES = ("contact_pressure", "unknown:context")
@@ -82,6 +86,19 @@ def clean(number: int, *, linear: bool, part: str = "clean") -> BlindGlove:
     bystander = dealt(BYSTANDERS, number, *label, "bystander")
     palm = dealt((False, False, False, True), number, *label, "palm")
     return _glove(part, "none", 0.0, number, label, (), bystander, linear=linear, palm=palm)
+
+
+def few_takes(number: int) -> BlindGlove:
+    """A healthy glove of any rate, with one kind of motion in two wearings of three short takes."""
+    label = ("few-takes",)
+    return replace(
+        clean(number, linear=False, part="few-takes"),
+        rate_hz=dealt(EVERY_RATE_HZ, number, *label, "rate"),
+        motion=dealt(MOTIONS, number, *label, "motion"),
+        wearings=2,
+        takes_per_wearing=3,
+        take_s=20.0,
+    )
 
 
 def in_turn(

@@ -15,6 +15,8 @@ JUDGED_SIZE = 1.3
 """Floors at which the first name has to be right."""
 SMALL_SIZE = 0.65
 """Floors at which the truth has to be in the confidence set."""
+FEWEST_HEALTHY = 300
+"""Gloves without which 1 % false names in few short takes are not said to be kept."""
 RIGHT, RIGHT_SET_ASIDE = 0.97, 0.92
 EACH_REACHES = 0.85
 """An effect's interval has to reach so far."""
@@ -130,6 +132,28 @@ def clean_figures(rows: Sequence[Row]) -> list[StudyFigure]:
                 f"diagnosis names an effect on a clean glove, {nuisance} nuisance", _false(some)
             )
         )
+    return found
+
+
+def few_takes_figures(rows: Sequence[Row]) -> list[StudyFigure]:
+    """What is told of healthy gloves in few short takes, by rate and by motion."""
+    found = [
+        StudyFigure.share(
+            "few short takes: an effect is named on a healthy glove",
+            _false(rows),
+            at_most=0.01,
+            fewest=FEWEST_HEALTHY,
+            headline="an effect named",
+        )
+    ]
+    for what in ("findings", "reference_problems", "unexplained_residual"):
+        label = f"few short takes: {what.replace('_', ' ')} on a healthy glove"
+        found.append(StudyFigure.share(label, [bool(answer[what]) for _, answer in rows]))
+    for name, unit in (("rate_hz", " Hz"), ("motion", "")):
+        for value in dict.fromkeys(getattr(glove, name) for glove, _ in rows):
+            some = [row for row in rows if getattr(row[0], name) == value]
+            shown = f"{value:g}{unit}" if isinstance(value, float) else value
+            found.append(StudyFigure.share(f"few short takes: an effect is named, {shown}", _false(some)))
     return found
 
 

@@ -49,6 +49,7 @@ PAGE = (
 COUNTS = {
     "gloves": "per effect and size",
     "clean": "clean gloves per base",
+    "few_takes": "healthy gloves with few short takes",
     "repairs": "gloves with one effect at 2.6 floors to be repaired, per effect",
     "pairs": "gloves with two effects per size",
     "second_names": "gloves with one effect through improve, in all",

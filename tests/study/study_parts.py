@@ -12,13 +12,14 @@ from blind_glove import BlindGlove
 from ceiling_answer import ceiling_answer, recorded_answer
 from ceiling_figures import ceiling_figures, recorded_figures
 from delay_gloves import delay_figures, delay_gloves
-from diagnosis_answer import diagnosis_answer
+from diagnosis_answer import diagnosis_answer, told_answer
 from glove_choices import (
     NOT_RECORDED,
     RECORDED_INPUTS,
     RECORDED_UNNAMED,
     clean,
     effect_names,
+    few_takes,
     in_turn,
     pair,
     undecided,
@@ -31,6 +32,7 @@ from naming_figures import (
     JUDGED_SIZE,
     SMALL_SIZE,
     clean_figures,
+    few_takes_figures,
     names_figures,
     sizes_figures,
     unknown_figures,
@@ -65,6 +67,8 @@ class StudyChoices:
     """Per effect and size."""
     clean: int = 150
     """Clean gloves per base."""
+    few_takes: int = 300
+    """Healthy gloves with few short takes."""
     repairs: int = 20
     """Gloves that are repaired, per effect."""
     pairs: int = 60
@@ -81,7 +85,7 @@ class StudyChoices:
     limits: ImprovementLimits = IMPROVEMENT_LIMITS
 
 
-QUICK = StudyChoices(gloves=1, clean=2, repairs=1, pairs=2, second_names=18, ceilings=24, recorded=8)
+QUICK = StudyChoices(gloves=1, clean=2, few_takes=2, repairs=1, pairs=2, second_names=18, ceilings=24, recorded=8)
 """Everything once: what can go wrong, no figure to rely on."""
 
 
@@ -250,6 +254,15 @@ PARTS: dict[str, StudyPart] = {
         glove_s=12,
         confusion=True,
         demanded="Clean gloves",
+        of_forms=False,
+    ),
+    "few-takes": StudyPart(
+        "healthy gloves in six short takes, of all rates and motions: is anything named?",
+        lambda choices: [few_takes(number) for number in range(choices.few_takes)],
+        told_answer,
+        few_takes_figures,
+        glove_s=4,
+        demanded="Healthy gloves in few short takes",
         of_forms=False,
     ),
     "delays": StudyPart(

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from blind_glove import BlindGlove, Nuisance
 from further_forms import every_form
-from glove_choices import BITS, NUISANCES, RATES_HZ, RECORDED_INPUTS, RECORDED_UNNAMED, clean, with_cause
+from glove_choices import (
+    BITS,
+    EVERY_RATE_HZ,
+    MOTIONS,
+    NUISANCES,
+    RATES_HZ,
+    RECORDED_INPUTS,
+    RECORDED_UNNAMED,
+    clean,
+    few_takes,
+    with_cause,
+)
 from study_parts import LEAD_S, PARTS, QUICK, REMEMBERING, StudyChoices
 from wandering_reference import WANDER_DEG
 
@@ -41,8 +52,15 @@ def test_every_form_and_device_comes_in_turn() -> None:
 def test_devices_are_not_tied_to_each_other_in_any_part(part: str) -> None:
     gloves = PARTS[part].gloves(StudyChoices())
     assert len({glove.key for glove in gloves}) == len(gloves)
-    assert {(glove.rate_hz, glove.bits) for glove in gloves} == set(product(RATES_HZ, BITS))
-    assert {(glove.nuisance, glove.rate_hz) for glove in gloves} == set(product(NUISANCES, RATES_HZ))
+    rates = EVERY_RATE_HZ if part == "few-takes" else RATES_HZ
+    assert {(glove.rate_hz, glove.bits) for glove in gloves} == set(product(rates, BITS))
+    assert {(glove.nuisance, glove.rate_hz) for glove in gloves} == set(product(NUISANCES, rates))
+
+
+def test_every_motion_comes_with_every_rate_in_few_takes() -> None:
+    gloves = [few_takes(number) for number in range(300)]
+    assert {(glove.motion, glove.rate_hz) for glove in gloves} == set(product(MOTIONS, EVERY_RATE_HZ))
+    assert {glove.duration_s for glove in gloves} == {120.0}
 
 
 def test_an_early_stop_has_a_little_of_everything() -> None:
