@@ -85,7 +85,9 @@ class StudyChoices:
     limits: ImprovementLimits = IMPROVEMENT_LIMITS
 
 
-QUICK = StudyChoices(gloves=1, clean=2, few_takes=2, repairs=1, pairs=2, second_names=18, ceilings=24, recorded=8)
+QUICK = StudyChoices(
+    gloves=1, clean=2, few_takes=2, repairs=1, pairs=2, second_names=18, ceilings=24, recorded=8
+)
 """Everything once: what can go wrong, no figure to rely on."""
 
 

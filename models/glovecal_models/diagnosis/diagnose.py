@@ -86,7 +86,9 @@ def asked(takes: Sequence[Take], layout: Layout, choices: Choices) -> State:
     design = problem.design()
     every = tuple(candidates(design.signals, choices.own))
     tried = every if choices.effects is None else choices.effects
-    waiting = tuple(item for item in tried if problem.is_sparse and needs_movement(item))
+    waiting = tuple(
+        item for item in tried if problem.is_still or (problem.is_sparse and needs_movement(item))
+    )
     is_measured, floors = not are_pose_labels(takes), choices.noise_floors
     if floors is None:
         floors = takes_noise(takes, problem.joints) if is_measured else {}

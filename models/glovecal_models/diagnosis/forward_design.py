@@ -39,10 +39,11 @@ FEWEST_OF_A_CUBIC = 10
 """Through fewer a cubic goes by chance."""
 
 
-def tied_angles(angles: np.ndarray, share: float) -> list[set[int]]:
+def tied_angles(angles: np.ndarray, share: float, noise_deg: float = 0.0) -> list[set[int]]:
     """For each column of ``angles`` (N, R), degrees: the others that are no candidates to pull at its sensor.
 
-    Others that are a cubic of it, but for ``share`` of their deviation. And where an angle follows from two
+    Others that are a cubic of it, but for ``share`` of their deviation. Others that tell it as closely as it
+    is measured itself, to ``noise_deg``, but for twice the share at most. And where an angle follows from two
     others together: that one for both, and for that one the more telling of both. The one that follows most
     closely is taken first, since two that it ties need not tell of each other.
     """
@@ -50,12 +51,15 @@ def tied_angles(angles: np.ndarray, share: float) -> list[set[int]]:
         return [set() for _ in range(angles.shape[1])]
     angles = angles[::ONE_IN] if len(angles) >= ENOUGH_TO_THIN else angles
     count, centred = angles.shape[1], angles - angles.mean(axis=0)
-    centred /= np.maximum(np.linalg.norm(centred, axis=0), 1e-9)
+    length = np.maximum(np.linalg.norm(centred, axis=0), 1e-9)
+    noise = np.minimum(noise_deg * np.sqrt(len(angles)) / length, 2.0 * share)
+    centred /= length
     cubics = np.concatenate([np.linalg.qr(_cubic(column))[0] for column in centred.T], axis=1)  # (N, 3 R)
     across = (cubics.T @ cubics).reshape(count, 3, count, 3).swapaxes(1, 2)
     of_cubic = (cubics.T @ centred).reshape(count, 3, count)
     left = 1.0 - np.square(of_cubic).sum(axis=1)  # of the second by a cubic of the first
-    tied = [set(np.flatnonzero(left[one] < share**2).tolist()) - {one} for one in range(count)]
+    alike = (left < share**2) | (left < noise**2).T
+    tied = [set(np.flatnonzero(alike[one]).tolist()) - {one} for one in range(count)]
     alone = [one for one in range(count) if not any(one in others for others in tied)]
     by_two = {one: _best_two(one, range(count), across, of_cubic) for one in alone}
     for one in sorted(alone, key=lambda one: by_two[one][0]):
@@ -154,12 +158,14 @@ class ForwardBasis:
         *,
         linear: bool,
         same_angle_share: float,
+        same_angle_deg: float,
         every: int = EVERY,
         camera: CameraPart = "varying",
     ) -> ForwardBasis:
         """Own sensor, scaled to degrees, from the measured angles; one measured row in ``every`` is fitted.
 
-        ``same_angle_share``: of its deviation, within which an angle follows from one or two others.
+        ``same_angle_share``: of its deviation, within which an angle follows from one or two others;
+        ``same_angle_deg``: within which another tells it as closely as it is measured.
         """
         names, is_seen = list(rotations), any(take.reference_sd is not None for take in takes)
         sensor = [_own_sensor(takes, layout, rotation, column) for column, rotation in enumerate(rotations)]
@@ -172,7 +178,7 @@ class ForwardBasis:
             for number, take in enumerate(takes)
         ]
         everything = np.concatenate(filled)
-        tied = tied_angles(everything, same_angle_share)
+        tied = tied_angles(everything, same_angle_share, same_angle_deg)
         cut = _cut(takes)
         unit_take = tuple(number for number, parts in enumerate(cut) for _ in parts)
         joints = []

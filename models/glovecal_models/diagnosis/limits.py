@@ -16,6 +16,14 @@ _REFERENCE = "Not tuned; chosen when contradictions between takes were first tol
 class DiagnosisLimits(SignificanceLimits):
     """All limits of a diagnosis, those of its effects included."""
 
+    least_moved_deg: float = limit(
+        3.0,
+        "degrees",
+        "No effect is judged on a rotation whose measured angles have a smaller standard deviation within"
+        " takes; where none has a larger one, the hand keeps still and nothing is judged.",
+        "17 of 23 healthy simulated hands that lay still had an effect named (2026-11-28); joints that do not"
+        " take part in a motion have 0.6 to 0.9, those that do 5.3 and more.",
+    )
     rival_worse_se: float = limit(
         2.5,
         "standard errors",
@@ -58,6 +66,14 @@ class DiagnosisLimits(SignificanceLimits):
         "4 of 100 simulated clean gloves, all with PIP and DIP joints that bend together (0.05), were called"
         " cross-coupled without it (2026-11-23). Of 4 clean gloves with 22 sensors, a virtual joint's among"
         " them, 3 were where single neighbours only were left out (2026-11-25).",
+    )
+    same_angle_deg: float = limit(
+        1.0,
+        "degrees",
+        "Nor is one that tells the joint's angle to within so much, as closely as it is measured itself (but"
+        " for twice that share at most).",
+        "All four healthy simulated gloves that were called cross-coupled among 160: a thumb's joint of 5 to 7"
+        " degrees that moved together with larger ones, by a reference that wanders by 0.5 (2026-11-28).",
     )
 
     camera_lean_share: float = limit(

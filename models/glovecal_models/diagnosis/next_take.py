@@ -27,6 +27,7 @@ from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import relations
 
 SINGLE_POSES = "the frames are single poses; record the movement from one to the next"
+STILL_HAND = "the hand keeps still: no rotation moves enough; record movement"
 ONLY_POSE_NAMES = "the reference only names poses (0 or 1) and measures no angle"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -71,6 +72,24 @@ class DiagnosisProblem:
         """Whether the frames are single poses."""
         return all(take.is_sparse for take in self.even)
 
+    @cached_property
+    def still(self) -> frozenset[str]:
+        """Joints that hardly move within any take: with their angle nothing goes along but noise."""
+        if self.is_sparse:
+            return frozenset()
+        known = [np.isfinite(take.reference) for take in self.even]
+        moved = [
+            np.where(mask, take.reference - _mean(take.reference, mask), 0.0)
+            for take, mask in zip(self.even, known, strict=True)
+        ]
+        spread = np.sqrt(_mean(np.concatenate(moved) ** 2, np.concatenate(known)))
+        return frozenset(np.array(self.joints)[spread < self.limits.least_moved_deg].tolist())
+
+    @property
+    def is_still(self) -> bool:
+        """Whether no joint moves."""
+        return len(self.still) == len(self.joints)
+
     @property
     def has_camera(self) -> bool:
         """Whether a reference states deviations."""
@@ -86,6 +105,7 @@ class DiagnosisProblem:
                 *([smoothed(take, smoothing) for take in self.even], self.layout, self.joints),
                 linear=self.linear,
                 same_angle_share=self.limits.same_angle_share,
+                same_angle_deg=self.limits.same_angle_deg,
                 every=every,
                 camera=camera,
             )
@@ -125,6 +145,11 @@ class DiagnosisProblem:
         stored = {} if first.steps is None else first.steps.to_settings()
         known = KnownEffect(effects[first.effect], where, shapes, stored=stored)
         return self.beside(_with_learned_terms(known, design))
+
+
+def _mean(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(R,) of the rows (N, R) that are known; 0 without any."""
+    return np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
 
 
 def _with_joints(take: ResampledTake, kept: np.ndarray) -> ResampledTake:

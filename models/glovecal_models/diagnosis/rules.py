@@ -25,7 +25,7 @@ from glovecal_models.diagnosis.naming import (
     with_known_saved,
     with_other_share,
 )
-from glovecal_models.diagnosis.next_take import SINGLE_POSES, NotIdentifiable, as_known
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable, as_known
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import (
     are_held_levels,
@@ -83,8 +83,19 @@ def compare(state: State) -> State:
     asked = state.question
     generator = np.random.default_rng(asked.seed)
     found, impossible = assessed(state.screened, asked.compared, generator, state.has, asked.progress)
-    waiting = [NotIdentifiable(item.name, SINGLE_POSES) for item in asked.waiting]
+    why = STILL_HAND if state.problem.is_still else SINGLE_POSES
+    waiting = [NotIdentifiable(item.name, why) for item in asked.waiting]
     return replace(state, assessments=tuple(found), not_identifiable=(*impossible, *waiting))
+
+
+def still_rotations(state: State) -> State:
+    """On a joint that hardly moves no effect is told from noise."""
+    joints = state.design.rotations
+    still = tuple(i for i, name in enumerate(joints) if name in state.problem.still)
+    if not still:
+        return state
+    after = [replace(item, still=still) for item in state.assessments]
+    return _assessed_anew(state, "still_rotations", after, "is not judged on {where}, which hardly moves")
 
 
 def any_form(state: State) -> State:
@@ -260,7 +271,8 @@ def look_for_signatures(state: State) -> State:
         asked.takes, asked.layout, state.problem.joints, state.naming, state.lacking, asked.by_name,
         asked.known, asked.found_before, asked.limits,
     )  # fmt: skip
-    return replace(state, findings=tuple(found) if asked.signatures else ())
+    is_asked = asked.signatures and not state.problem.is_still
+    return replace(state, findings=tuple(found) if is_asked else ())
 
 
 def slip_beside_known(state: State) -> State:
@@ -401,7 +413,8 @@ def whole_first(state: State) -> State:
 def leave_first(state: State) -> State:
     """The held-out residual with the first of the ranking in the base."""
     asked = state.question
-    if not asked.judge_residual or state.problem.is_sparse or are_held_levels(asked.takes):
+    cannot_tell = state.problem.is_sparse or state.problem.is_still or are_held_levels(asked.takes)
+    if not asked.judge_residual or cannot_tell:
         return state
     after = state.problem.with_first(state.naming.first, asked.by_name, state.design)
     rest = after.design()
@@ -438,8 +451,10 @@ def judge_residual(state: State) -> State:
     asked, after, rest = state.question, state.after, state.rest
     asked.progress("testing the residual", 0.95)
     if after is None or rest is None or state.settled is None:
-        obstacle = "single poses" if asked.judge_residual else None
-        return replace(state, residual=UnexplainedResidual(obstacle=obstacle))
+        obstacle = "still hand" if state.problem.is_still else "single poses"
+        return replace(
+            state, residual=UnexplainedResidual(obstacle=obstacle if asked.judge_residual else None)
+        )
     has = [item.effect.name for item in asked.known if item.joints]
     residual = unexplained_residual(
         state.settled, state.problem.even, asked.layout, asked.seed, floors=asked.floors,
@@ -476,6 +491,7 @@ def own_column(state: State) -> State:
 
 ASSESSING = (
     Rule(compare, is_evidence=True),
+    Rule(still_rotations),
     Rule(any_form),
     Rule(memory_of_known),
     Rule(form_of_known),

@@ -66,7 +66,7 @@ class Question(Choices):
     compared: tuple[Effect, ...]
     """Those whose held-out errors are compared."""
     waiting: tuple[Effect, ...]
-    """Those that the takes cannot show, as they are single poses."""
+    """Those that the takes cannot show, as they are single poses or the hand keeps still."""
     by_name: Mapping[str, Effect]
     """All of them."""
     floors: Mapping[str, NoiseFloor]

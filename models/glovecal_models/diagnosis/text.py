@@ -21,7 +21,7 @@ from glovecal_models.diagnosis.answer import (
 from glovecal_models.diagnosis.camera_errors import CAMERA
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.hold_text import drift_in_holds, hold_sentence
-from glovecal_models.diagnosis.next_take import SINGLE_POSES, NotIdentifiable
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable
 from glovecal_models.diagnosis.residual_answer import (
     AssociatedColumn,
     FloorTimes,
@@ -127,7 +127,9 @@ def by_column_sentence(actions: Sequence[Action]) -> str:
 
 
 def nothing_named_sentence(diagnosis: Diagnosis) -> str:
-    """Because nothing beats its control, or because the takes are too short."""
+    """Because nothing beats its control, the takes are too short, or the hand keeps still."""
+    if STILL_HAND in {item.why for item in diagnosis.not_identifiable}:
+        return f"No effect is judged: {STILL_HAND}."
     blocks = max((len(e.base) for item in diagnosis.assessments for e in item.errors), default=0)
     fewest = diagnosis.limits.fewest_blocks
     if blocks < fewest:
@@ -297,6 +299,8 @@ def residual_obstacle(residual: UnexplainedResidual) -> str | None:
     """Why the residual cannot be judged, as the end of a sentence; None where it can."""
     if residual.obstacle == "single poses":
         return SINGLE_POSES
+    if residual.obstacle == "still hand":
+        return STILL_HAND
     if residual.obstacle == "no measured angle":
         return "no angle was measured"
     if residual.obstacle == "few stretches":

@@ -49,9 +49,9 @@ SHORTEST_LINE_S = 4.0
 """As the shortest take of which a slow error is judged."""
 MOST_JOINTS = 6
 """So many of the worst are tested against every column."""
-Obstacle = Literal["single poses", "no measured angle", "few stretches", "wide interval"]
-"""Why takes cannot tell: their frames are single poses, their reference only names poses, too little was
-measured, or the estimate exceeds a healthy glove's and its lower bound does not."""
+Obstacle = Literal["single poses", "still hand", "no measured angle", "few stretches", "wide interval"]
+"""Why takes cannot tell: their frames are single poses, the hand keeps still, their reference only names
+poses, too little was measured, or the estimate exceeds a healthy glove's and its lower bound does not."""
 
 
 @dataclass(frozen=True)

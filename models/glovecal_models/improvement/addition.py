@@ -166,7 +166,12 @@ def share_left_by_control(
     even = [smoothed(resampled(take, model.layout.sensors, joints, bridge), SMOOTHING) for take in takes]
     on = ModelOnTakes.of_repaired(model, takes).without(effect.name)
     basis = ForwardBasis.of(
-        even, model.layout, joints, linear=on.linear, same_angle_share=limits.same_angle_share
+        even,
+        model.layout,
+        joints,
+        linear=on.linear,
+        same_angle_share=limits.same_angle_share,
+        same_angle_deg=limits.same_angle_deg,
     )
     direction = forward(basis, joints, known=on.known, limits=limits)
     if known_share is None:

@@ -48,7 +48,8 @@ def test_two_measurements_of_one_angle_are_no_cross_coupling(seed):
     layout = Layout.from_columns("three", sensors, sensors)
     takes = record_session(SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=3, take_s=20.0)).takes
     assert diagnose(takes, layout).named is None
-    named = diagnose(takes, layout, limits=replace(DIAGNOSIS_LIMITS, same_angle_share=0.0)).named
+    apart = replace(DIAGNOSIS_LIMITS, same_angle_share=0.0, same_angle_deg=0.0)
+    named = diagnose(takes, layout, limits=apart).named
     assert named is not None
     assert named.effect == "cross_coupling"
 

@@ -89,5 +89,5 @@ def test_a_diagnosis_ends_without_any_rule(rule: str) -> None:
     """On evidence that is there already."""
     *_, compared = states(start(), RULES[:2])
     rest = replace(compared, question=replace(compared.question, without=frozenset({rule})))
-    *_, last = states(rest, RULES[2:13])
+    *_, last = states(rest, RULES[2:14])
     assert rule not in {item.rule for item in last.decided}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -56,6 +56,17 @@ class JointErrors:
         """(B,): what each block saves against the better of base and control."""
         return (self.base if self.control_saved <= 0 else self.control) - self.added
 
+    @property
+    def without_best_take(self) -> JointErrors:
+        """Without the take that saves most; all of the only one."""
+        takes = np.unique(self.take)
+        if len(takes) < 2:
+            return self
+        saved = [float(self.beyond_control[self.take == number].sum()) for number in takes]
+        rest = self.take != takes[int(np.argmax(saved))]
+        return replace(self, base=self.base[rest], added=self.added[rest], control=self.control[rest],
+                       take=self.take[rest])  # fmt: skip
+
 
 @dataclass(frozen=True)
 class HeldOutRmse:
@@ -94,6 +105,8 @@ class Assessment:
     within_slip: tuple[int, ...] = ()
     """Joints whose slow error, beside the model's effects, is no larger than that of a healthy glove, which
     slips a little: what changes from take to take is nothing else there."""
+    still: tuple[int, ...] = ()
+    """Joints that hardly move: nothing is told of them."""
     of_known: tuple[int, ...] = ()
     """Joints on which the memory is of what the model's effects add there, not of the joint's own motion."""
     part_of: str = ""
@@ -111,7 +124,8 @@ class Assessment:
         model may have left there, and is not the camera's; none where it seems to explain a part of one."""
         if self.part_of:
             return ()
-        mine = (i for i in self._beyond_control if i not in (*self.within_camera, *self.within_slip))
+        not_its_own = (*self.within_camera, *self.within_slip, *self.still)
+        mine = (i for i in self._beyond_control if i not in not_its_own)
         return tuple(i for i in mine if not self._is_within_known(i))
 
     @cached_property
@@ -144,13 +158,21 @@ class Assessment:
         return tuple(sorted(some))
 
     def _is_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
-        limits = self.limits
+        """In every block alike, or now and then and then much; and without the best take, too."""
+        limits, rest = self.limits, errors.without_best_take
         if errors.contrast < limits.least_share:
             return False
-        if signed_rank(errors.beyond_control, limits.fewest_blocks) <= p_value:
-            return True
-        is_large = errors.contrast >= limits.rare_share
-        return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= limits.rare_p_value
+        if p_value < (smallest := 0.5 ** len(errors.base)):
+            if errors.contrast < limits.few_blocks_share:
+                return False
+            p_value = smallest
+        fewest, rest_p_value = limits.fewest_blocks, max(limits.rest_p_value, 0.5 ** len(rest.base))
+        if signed_rank(errors.beyond_control, fewest) <= p_value:
+            return signed_rank(rest.beyond_control, 1) <= rest_p_value
+        if errors.contrast < limits.rare_share:
+            return False
+        is_rare = random_signs(errors.beyond_control, fewest) <= limits.rare_p_value
+        return is_rare and random_signs(rest.beyond_control, 1) <= limits.rest_p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
@@ -158,7 +180,8 @@ class Assessment:
         if p_value > (self.certainty.clear if is_clear else self.certainty.faint):
             return ()
         least = self.limits.least_session_share
-        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= least)
+        every = enumerate(self.errors)
+        return tuple(i for i, item in every if min(item.contrast, item.without_best_take.contrast) >= least)
 
     @property
     def saved_square(self) -> float:
