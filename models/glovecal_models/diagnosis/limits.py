@@ -70,8 +70,8 @@ class DiagnosisLimits(SignificanceLimits):
     same_angle_deg: float = limit(
         1.0,
         "degrees",
-        "Nor is one that tells the joint's angle to within so much, as closely as it is measured itself (but"
-        " for twice that share at most).",
+        "Nor is one that tells the joint's angle to within so much, as closely as it is measured itself"
+        " (but for twice that share at most).",
         "All four healthy simulated gloves that were called cross-coupled among 160: a thumb's joint of 5 to 7"
         " degrees that moved together with larger ones, by a reference that wanders by 0.5 (2026-11-28).",
     )

@@ -91,16 +91,16 @@ class SignificanceLimits:
     rest_p_value: float = limit(
         1e-3,
         "p value",
-        "The same tests without the take that saves most: one take is no evidence by itself. What changes from"
-        " take to take has to save least_session_share without it.",
+        "The same tests without the take that saves most: one take is no evidence by itself. What changes"
+        " from take to take has to save least_session_share without it.",
         "100 times the p value of all takes, as a few takes are fewer blocks. A temperature that saved 40 % of"
         " the error of a healthy glove saved none of it without one take of six (2026-11-28).",
     )
     few_blocks_share: float = limit(
         0.3,
         "share of the squared error",
-        "With so few blocks that no p value can be as small, an effect must save so much beyond its control in"
-        " every one of them.",
+        "With so few blocks that no p value can be as small, an effect must save so much beyond its control"
+        " in every one of them.",
         "Not tuned; chosen (2026-11-28).",
     )
     fewest_blocks: int = limit(
