@@ -93,8 +93,8 @@ class SignificanceLimits:
         "p value",
         "The same tests without the take that saves most: one take is no evidence by itself. What changes"
         " from take to take has to save least_session_share without it.",
-        "100 times the p value of all takes, as a few takes are fewer blocks. A temperature that saved 40 % of"
-        " the error of a healthy glove saved none of it without one take of six (2026-11-28).",
+        "100 times the p value of all takes, as a few takes are fewer blocks. A temperature that saved 40 %"
+        " of the error of a healthy glove saved none of it without one take of six (2026-11-28).",
     )
     few_blocks_share: float = limit(
         0.3,
