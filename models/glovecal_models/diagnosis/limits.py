@@ -73,7 +73,8 @@ class DiagnosisLimits(SignificanceLimits):
         "Nor is one that tells the joint's angle to within so much, as closely as it is measured itself"
         " (but for twice that share at most).",
         "All four moving healthy simulated gloves that kept a wrong cross-coupling among 160: a thumb's joint"
-        " of 5 to 7 degrees that moved together with larger ones, by a reference that wanders by 0.5 (2026-11-28).",
+        " of 5 to 7 degrees that moved together with larger ones, by a reference that wanders by 0.5"
+        " (2026-11-28).",
     )
 
     camera_lean_share: float = limit(
