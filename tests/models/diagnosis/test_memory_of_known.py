@@ -57,7 +57,7 @@ def test_nothing_is_a_memory_of_effects_that_remember_by_themselves():
 
 
 def test_what_the_arch_does_by_itself_is_not_named():
-    takes = takes_with(Cause("palm_arch", "sticks_to_palm", 3.0), take_s=40.0)
+    takes = takes_with(Cause("palm_arch", "sticks_to_palm", 3.0), take_s=64.0)
     found = diagnose(takes, LAYOUT, known=(ARCH,))
     assert not found.naming.ranked
     refused = [item for item in found.assessments if item.of_known]
