@@ -9,6 +9,7 @@ from other_gloves import displaced, other_hand
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import PoseDatabase
+from glovecal_models.colour_glove.hand_state import STAGES
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
 from glovecal_models.colour_glove.photograph import hand_motion
@@ -154,8 +155,21 @@ def test_following_steadies_and_a_gap_is_forgotten(lookup, errors):
     assert np.array_equal(first.state.vector(), later.state.vector())
 
 
-def test_errors_are_learned_and_wrong_files_refused(lookup: PoseLookup, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_errors_are_learned(lookup: PoseLookup) -> None:
+    """As for the file that comes with the package, but from three clips."""
     found = learned_errors(HAND, lookup, 1, clips=3, workers=1)
+    assert set(found.scales) == {scale_name(stage, False) for stage in STAGES} | {
+        scale_name(stage, True) for stage in ("ik", "dense")
+    }
+    assert np.linalg.eigvalsh(found.blend_covariance).min() > 0.0
+    assert all(np.isfinite(scale).all() for scale in found.scales.values())
+    with pytest.raises(Cancelled):
+        learned_errors(HAND, lookup, 1, clips=5, workers=1, cancelled=lambda: True)
+
+
+def test_errors_are_read_as_they_were_written_and_wrong_files_refused(tmp_path: Path) -> None:
+    found = shipped_errors(2, "right")
     arrays = {f"these: {name}": array for name, array in found.arrays().items()}
     np.savez(tmp_path / "errors.npz", allow_pickle=False, **arrays)
     again = LearnedErrors.load(tmp_path / "errors.npz", "these: ")
@@ -169,8 +183,6 @@ def test_errors_are_learned_and_wrong_files_refused(lookup: PoseLookup, tmp_path
     evidence = np.zeros((26, len(EVIDENCE)))
     with pytest.raises(BadInput, match="were never learned"):
         LearnedErrors(found.blend_covariance, found.speed, {}).deviation("ik", False, evidence)
-    with pytest.raises(Cancelled):
-        learned_errors(HAND, lookup, 1, clips=5, workers=1, cancelled=lambda: True)
 
 
 @pytest.mark.parametrize("cameras", [1, 2, 3])

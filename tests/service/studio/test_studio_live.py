@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -57,6 +58,17 @@ def view_of(card: Locator, expression: str) -> Any:
 
 def in_state(card: Locator, word: str) -> None:
     expect(card.locator(".state-word").first).to_have_text(word)
+
+
+def _settles(card: Locator, terms: Locator) -> bool:
+    """Whether a transient is told before all is well again."""
+    word = card.locator(".state-word").first
+    expect(word).to_have_text(re.compile("settling|ok"))
+    while word.inner_text() == "settling":
+        if "Transient: " in terms.inner_text():
+            return True
+        card.page.wait_for_timeout(50)
+    return False
 
 
 def number_in(text: str) -> float:
@@ -168,13 +180,16 @@ def test_a_glove_goes_through_all_its_states_and_its_angle_is_explained(
         in_state(card, "faulty sensor")
         expect(terms).to_contain_text("Held: a sensor that it is read from fails")
         acts.remove("dropped")
-        acts.add("silent")
-        in_state(card, "stale")
-        expect(terms).to_contain_text("No frame of glove explained arrives")
-        time.sleep(LONGEST_GAP_S)  # after shorter gaps what is remembered still holds
-        acts.remove("silent")
-        in_state(card, "settling")
-        expect(terms).to_contain_text("Transient: ")
+        for _ in range(5):  # a page whose connection is lost for a moment does not see it settle
+            acts.add("silent")
+            in_state(card, "stale")
+            expect(terms).to_contain_text("No frame of glove explained arrives")
+            time.sleep(LONGEST_GAP_S)  # after shorter gaps what is remembered still holds
+            acts.remove("silent")
+            if _settles(card, terms):
+                break
+        else:
+            pytest.fail("five times no transient was seen")
         assert serious(page) == []
         terms.get_by_role("button", name="Close").press("Enter")
         expect(terms).to_have_count(0)
