@@ -113,8 +113,9 @@ def found_of(condition: Condition, seed: int) -> Found:
         parts.append(of_takes)
     errors = [np.concatenate([error for error, _ in each]) for each in parts]
     inside = [np.concatenate([share for _, share in each]) for each in parts]
-    rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
-    return Found(*rms, *(float(np.mean(each)) for each in inside), _about(session))
+    live_rms, offline_rms = (float(np.sqrt(np.mean(error**2))) for error in errors)
+    live_inside, offline_inside = (float(np.mean(each)) for each in inside)
+    return Found(live_rms, offline_rms, live_inside, offline_inside, _about(session))
 
 
 def _inside(angles: GloveAngles, take: Take, model: CalibrationModel) -> np.ndarray:

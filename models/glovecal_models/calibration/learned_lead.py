@@ -106,4 +106,5 @@ def _learned(motions: Sequence[SmoothedMotion], row: int, takes: PreparedTakes, 
     weights = solved[1:]
     spread = [np.einsum("nij,i,j->n", motion.covariance[:, row], weights, weights) for motion in motions]
     variance = max(left - float(np.mean(np.concatenate(spread))), LEAST_VARIANCE)
-    return Lead(*map(float, solved), variance)
+    offset, gain, velocity, acceleration = map(float, solved)
+    return Lead(offset, gain, velocity, acceleration, variance)
