@@ -57,29 +57,29 @@ def smoothed(time_s: np.ndarray, angles: np.ndarray, known: np.ndarray | None = 
     known = np.ones(angles.shape, bool) if known is None else known
     state = np.zeros((frames, joints, STATES))
     state[:, :, 0] = angles
-    found = SmoothedMotion(state, np.zeros((frames, joints, STATES, STATES)), np.zeros(angles.shape))
+    motion = SmoothedMotion(state, np.zeros((frames, joints, STATES, STATES)), np.zeros(angles.shape))
     for run in unbroken(time_s):
-        for kept, beside in _pieces(time_s, run):
-            if beside.stop - beside.start < SHORTEST_RUN:
+        for kept, around in _pieces(time_s, run):
+            if around.stop - around.start < SHORTEST_RUN:
                 continue
-            part = _smoothed(time_s[beside], angles[beside], known[beside])
-            inner = slice(kept.start - beside.start, kept.stop - beside.start)
-            found.state[kept], found.covariance[kept] = part.state[inner], part.covariance[inner]
-            found.noise[kept] = part.noise[inner]
-    return found
+            part = _smoothed(time_s[around], angles[around], known[around])
+            inner = slice(kept.start - around.start, kept.stop - around.start)
+            motion.state[kept], motion.covariance[kept] = part.state[inner], part.covariance[inner]
+            motion.noise[kept] = part.noise[inner]
+    return motion
 
 
 def _pieces(time_s: np.ndarray, run: slice) -> list[tuple[slice, slice]]:
     """Rows of each piece of ``run``, and the same with a margin on either side."""
     count = max(1, round((run.stop - run.start) / PIECE_FRAMES))
     edges = np.linspace(run.start, run.stop, count + 1).astype(int).tolist()
-    found = []
+    pieces = []
     for start, stop in itertools.pairwise(edges):
         if stop > start:
             ends = time_s[start] - MARGIN_S, time_s[stop - 1] + MARGIN_S
             first, last = np.searchsorted(time_s, ends).tolist()
-            found.append((slice(start, stop), slice(max(first, run.start), min(last, run.stop))))
-    return found
+            pieces.append((slice(start, stop), slice(max(first, run.start), min(last, run.stop))))
+    return pieces
 
 
 def _smoothed(time_s: np.ndarray, angles: np.ndarray, known: np.ndarray) -> SmoothedMotion:
@@ -173,20 +173,20 @@ def _both_ways(
         errors[frame] = error * weight
         state = state + gain * error[:, None]
         covariance = covariance - gain[:, :, None] * covariance[:, None, 0, :]
-    said, knew = _said_later(forward, gains, errors, counts / (covariances[:, :, 0, 0] + 1.0))
+    adjoints, informations = _backward(forward, gains, errors, counts / (covariances[:, :, 0, 0] + 1.0))
     return (
-        states + (covariances @ said[..., None])[..., 0],
-        covariances - covariances @ knew @ covariances,
+        states + (covariances @ adjoints[..., None])[..., 0],
+        covariances - covariances @ informations @ covariances,
     )
 
 
-def _said_later(
+def _backward(
     forward: np.ndarray, gains: np.ndarray, errors: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """What each frame and all later ones say of the state that was predicted there, (N, L, 3), and how much
     they know of it, (N, L, 3, 3)."""
     frames, joints = errors.shape
-    said, knew = np.empty((frames, joints, STATES)), np.empty((frames, joints, STATES, STATES))
+    adjoints, informations = np.empty((frames, joints, STATES)), np.empty((frames, joints, STATES, STATES))
     later, knowledge = np.zeros((joints, STATES)), np.zeros((joints, STATES, STATES))
     for frame in range(frames - 1, -1, -1):
         if frame < frames - 1:
@@ -198,5 +198,5 @@ def _said_later(
         knowledge[:, :, 0] -= (knowledge @ gain[:, :, None])[:, :, 0]
         knowledge[:, 0, :] -= (gain[:, None, :] @ knowledge)[:, 0, :]
         knowledge[:, 0, 0] += weights[frame]
-        said[frame], knew[frame] = later, knowledge
-    return said, knew
+        adjoints[frame], informations[frame] = later, knowledge
+    return adjoints, informations

@@ -20,7 +20,7 @@ from glovecal_models.calibration.correction_parts import CorrectionPart, Correct
 from glovecal_models.calibration.effect_correction import usable_correction
 from glovecal_models.calibration.motion_smoother import SmoothedMotion, smoothed
 from glovecal_models.calibration.predictor import LEAST_VARIANCE, GloveAngles, GlovePredictor
-from glovecal_models.effects.base.effect import CorrectionEffect
+from glovecal_models.effects.base.effect import CorrectionEffect, Late
 
 LEAD = "lead"
 """Where the settings of a late effect keep the ``Lead`` of each rotation."""
@@ -72,8 +72,8 @@ class OfflinePredictor(GlovePredictor):
         # Instead of single frames' noise, which a live claim holds, ``spread`` is what is left of it.
         learned = np.array([name in leads for name in names])
         unsmoothed = np.where(learned, [lead.variance for lead in each], self._left_out() - motion.noise)
-        beside = live.sd**2 - late.claimed - self._noise[:, 0]
-        variance = np.maximum(beside + unsmoothed, LEAST_VARIANCE) + spread
+        other = live.sd**2 - late.claimed - self._noise[:, 0]
+        variance = np.maximum(other + unsmoothed, LEAST_VARIANCE) + spread
         for row, sources, weights in self.rules:
             mean[:, row] = mean[:, sources] @ weights
             variance[:, row] = variance[:, sources] @ (weights * weights)
@@ -143,4 +143,4 @@ def parts_led(
 
 def is_late(item: AddedEffect) -> bool:
     effect = item.effect
-    return isinstance(effect, CorrectionEffect) and effect.dynamics.is_late
+    return isinstance(effect, CorrectionEffect) and isinstance(effect.dynamics, Late)

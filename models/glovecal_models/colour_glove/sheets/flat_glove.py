@@ -86,7 +86,7 @@ class FlatPiece:
     @property
     def crease_mm(self) -> np.ndarray:
         """(K, 2, 2): the wrist's crease, as pieces of a line; where the skin has x = 0."""
-        height, found = self.surface_mm[:, 0], []
+        height, pieces = self.surface_mm[:, 0], []
         for corners in self.triangles[np.ptp(np.sign(height[self.triangles]), axis=1) == 2]:
             ends = [
                 self.points_mm[a]
@@ -94,8 +94,8 @@ class FlatPiece:
                 for a, b in zip(corners, np.roll(corners, -1), strict=True)
                 if height[a] * height[b] < 0
             ]
-            found.append(ends)
-        return np.array(found).reshape(-1, 2, 2)
+            pieces.append(ends)
+        return np.array(pieces).reshape(-1, 2, 2)
 
     @property
     def stretch(self) -> np.ndarray:

@@ -241,8 +241,8 @@ def _overview(pieces: list[_MarkedPiece], skin: HandSkin, pattern: Pattern, pape
     y = top + rows * 6.0 + 4.0
     for heading, lines in _INSTRUCTIONS:
         sheet.text((room.left, y), heading, size_mm=3.0, bold=True, anchor="left top")
-        said = lines.format(pages=pages, hem_mm=pieces[0].piece.hem_mm)
-        sheet.text((room.left + 16.0, y), said, size_mm=3.0, anchor="left top")
+        text = lines.format(pages=pages, hem_mm=pieces[0].piece.hem_mm)
+        sheet.text((room.left + 16.0, y), text, size_mm=3.0, anchor="left top")
         y += 4.3 * (lines.count("\n") + 1) + 2.5
     return sheet
 

@@ -68,9 +68,6 @@ class Dynamics(ABC):
 
     has_memory: bool = False
     """Whether its columns depend on earlier frames."""
-    is_late: bool = False
-    """Whether a reading comes late by it, so that its columns lead; a recording is led by its smoothed motion
-    instead (``calibration.offline``)."""
 
     @property
     def needs_time(self) -> bool:
@@ -101,6 +98,11 @@ class Dynamics(ABC):
         """(C,) weights with which it may distort a sensor, as its columns of the measured angle; of any size:
         whoever puts the effect into a session scales them."""
         return prior_sd * generator.standard_normal(len(prior_sd))
+
+
+class Late(Dynamics):
+    """A reading comes late by it, so that its columns lead; a recording is led by its smoothed motion instead
+    (``calibration.offline``)."""
 
 
 class Effect(ABC):

@@ -15,6 +15,7 @@ import numpy as np
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.base.dynamics import ArrayStateEffect
+from glovecal_models.effects.base.effect import Late
 from glovecal_models.effects.base.facts import About, Parameter, Shape, Weights
 from glovecal_models.effects.base.relations import FAST
 from glovecal_models.effects.base.relaxation import relax, relax_once
@@ -49,7 +50,7 @@ class LagComparison(DelayComparison):
         )
 
 
-class Lag(ArrayStateEffect):
+class Lag(ArrayStateEffect, Late):
     name = LAG
     about = About(
         "The sensor follows the joint late: fast movements come out smaller and delayed.",
@@ -60,7 +61,6 @@ class Lag(ArrayStateEffect):
     )
     shape = Shape((Parameter("tau", "s", 0.005, 0.15, "5 to 150 ms", tried=TAU_S),))
     comparison = LagComparison()
-    is_late = True
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         return self.comparison.not_applicable_reason(takes)
