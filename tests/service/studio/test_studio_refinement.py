@@ -50,15 +50,16 @@ def line(settings: Settings, address: str) -> str:
 
 
 def turn_to(card: Locator, offset_deg: str) -> None:
-    """One step of the slider. A key that came before a busy browser was ready is pressed again."""
-    slider = card.get_by_role("slider", name="Offset, degrees").locator('[tabindex="0"]')
-    shown = card.locator(".refine-value").last
-    for _ in range(5):
-        slider.press("ArrowRight")
+    """One step of the slider. A key that came before a busy browser was ready is pressed again; one that the
+    slider took is not, however long the version takes to be made."""
+    slider = card.get_by_role("slider", name="Offset, degrees")
+    before = slider.get_attribute("aria-valuenow") or ""
+    for _ in range(20):
+        slider.locator('[tabindex="0"]').press("ArrowRight")
         with suppress(AssertionError):
-            expect(shown).to_have_text(offset_deg, timeout=20_000)
-            return
-    expect(shown).to_have_text(offset_deg)
+            expect(slider).not_to_have_attribute("aria-valuenow", before, timeout=5_000)
+            break
+    expect(card.locator(".refine-value").last).to_have_text(offset_deg)
 
 
 def active(address: str) -> str:
