@@ -69,8 +69,7 @@ def camera_errors(problem: DiagnosisProblem, takes: Sequence[Take]) -> CameraErr
     errors = tuple(_joint_errors(without, with_it, control, joint) for joint in chosen)
     names = tuple(without.rotations[joint] for joint in chosen)
     nothing = tuple(np.empty(0) for _ in names)
-    alone = replace(problem.limits, joint_p_value=problem.limits.camera_p_value)
-    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=alone)
+    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=problem.limits)
     return CameraErrors(found, {name: stated[name] for name in names}, covered_ranges(takes, names))
 
 

@@ -84,12 +84,6 @@ class DiagnosisLimits(SignificanceLimits):
         "Chosen on 8 simulated clean gloves and 8 with cross-coupling, judged by a camera that leans to its"
         " prior by half of its deviation (2026-11-23).",
     )
-    camera_p_value: float = limit(
-        2e-4,
-        "p value",
-        "joint_p_value of what goes along with a camera's own deviation.",
-        "One candidate instead of some 17.",
-    )
     camera_beaten_se: float = limit(
         2.5,
         "standard errors",

@@ -27,7 +27,7 @@ LAYOUT = Layout.from_columns("two", SENSORS, SENSORS)
 
 @cache
 def session(effect: str = "", seed: int = 11) -> RecordedSession:
-    plan = SessionPlan(seed=seed, sensors=SENSORS, wearings=2, takes_per_wearing=3, take_s=45.0)
+    plan = SessionPlan(seed=seed, sensors=SENSORS, wearings=2, takes_per_wearing=2, take_s=45.0)
     return record_session(plan, [Cause(effect, strength_deg=2.0)] if effect else [])
 
 

@@ -46,7 +46,7 @@ def test_two_measurements_of_one_angle_are_no_cross_coupling(seed):
     """PIP and DIP joints bend together: of two noisy angles each says something of the other's sensor."""
     sensors = ("I_MCP", "M_PIP", "M_DIP")
     layout = Layout.from_columns("three", sensors, sensors)
-    takes = record_session(SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=3, take_s=40.0)).takes
+    takes = record_session(SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=3, take_s=20.0)).takes
     assert diagnose(takes, layout).named is None
     apart = replace(DIAGNOSIS_LIMITS, same_angle_share=0.0, same_angle_deg=0.0)
     named = diagnose(takes, layout, limits=apart).named

@@ -29,8 +29,8 @@ LAYOUT = Layout.from_document(
 ARCH = KnownEffect(effect("palm_arch"), JOINTS, (np.empty(0),) * len(JOINTS))
 
 
-def takes_with(*causes: Cause, take_s: float = 24.0) -> tuple[Take, ...]:
-    plan = SessionPlan(seed=12, sensors=SENSORS, take_s=take_s)
+def takes_with(*causes: Cause) -> tuple[Take, ...]:
+    plan = SessionPlan(seed=12, sensors=SENSORS, take_s=24.0)
     return record_session(plan, causes, forms_of=every_form).takes
 
 
@@ -57,8 +57,7 @@ def test_nothing_is_a_memory_of_effects_that_remember_by_themselves():
 
 
 def test_what_the_arch_does_by_itself_is_not_named():
-    takes = takes_with(Cause("palm_arch", "sticks_to_palm", 3.0), take_s=64.0)
-    found = diagnose(takes, LAYOUT, known=(ARCH,))
+    found = diagnose(takes_with(Cause("palm_arch", "sticks_to_palm", 3.0)), LAYOUT, known=(ARCH,))
     assert not found.naming.ranked
     refused = [item for item in found.assessments if item.of_known]
     assert {item.effect for item in refused} == {"hysteresis", "creep"}

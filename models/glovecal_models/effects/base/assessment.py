@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -55,17 +55,6 @@ class JointErrors:
     def beyond_control(self) -> np.ndarray:
         """(B,): what each block saves against the better of base and control."""
         return (self.base if self.control_saved <= 0 else self.control) - self.added
-
-    @property
-    def without_best_take(self) -> JointErrors:
-        """Without the take that saves most; all of the only one."""
-        takes = np.unique(self.take)
-        if len(takes) < 2:
-            return self
-        saved = [float(self.beyond_control[self.take == number].sum()) for number in takes]
-        rest = self.take != takes[int(np.argmax(saved))]
-        return replace(self, base=self.base[rest], added=self.added[rest], control=self.control[rest],
-                       take=self.take[rest])  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -158,21 +147,13 @@ class Assessment:
         return tuple(sorted(some))
 
     def _is_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
-        """In every block alike, or now and then and then much; and without the best take, too."""
-        limits, rest = self.limits, errors.without_best_take
+        limits = self.limits
         if errors.contrast < limits.least_share:
             return False
-        if p_value < (smallest := 0.5 ** len(errors.base)):
-            if errors.contrast < limits.few_blocks_share:
-                return False
-            p_value = smallest
-        fewest, rest_p_value = limits.fewest_blocks, max(limits.rest_p_value, 0.5 ** len(rest.base))
-        if signed_rank(errors.beyond_control, fewest) <= p_value:
-            return signed_rank(rest.beyond_control, 1) <= rest_p_value
-        if errors.contrast < limits.rare_share:
-            return False
-        is_rare = random_signs(errors.beyond_control, fewest) <= limits.rare_p_value
-        return is_rare and random_signs(rest.beyond_control, 1) <= limits.rest_p_value
+        if signed_rank(errors.beyond_control, limits.fewest_blocks) <= p_value:
+            return True
+        is_large = errors.contrast >= limits.rare_share
+        return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= limits.rare_p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
@@ -180,8 +161,7 @@ class Assessment:
         if p_value > (self.certainty.clear if is_clear else self.certainty.faint):
             return ()
         least = self.limits.least_session_share
-        every = enumerate(self.errors)
-        return tuple(i for i, item in every if min(item.contrast, item.without_best_take.contrast) >= least)
+        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= least)
 
     @property
     def saved_square(self) -> float:
