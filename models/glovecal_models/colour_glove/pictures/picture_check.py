@@ -239,8 +239,8 @@ def light_advice(shares: Sequence[float]) -> str:
     if len(shares) < _FEWEST_LIT or (mean := float(np.mean(shares))) <= MOST_SHADOWED:
         return ""
     return (
-        f"{mean:.0%} of the glove is in shadow on average (at most {MOST_SHADOWED:.0%} is well): colours are "
-        "mistaken there. Light it from all sides, by a second lamp or against a white wall."
+        f"{mean:.0%} of the glove is in shadow on average (up to {MOST_SHADOWED:.0%} does no harm): colours "
+        "are mistaken there. Light it from all sides, by a second lamp or against a white wall."
     )
 
 
