@@ -24,8 +24,12 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, BinaryIO, TypeVar
@@ -74,23 +78,117 @@ def work_off(
     training"). Raises Cancelled, WorkerDied, and what ``work``, ``take`` and ``tasks`` raise. No worker
     outlives the call.
     """
-    numbered = enumerate(tasks)
     if workers == 1:
-        for number, task in numbered:
+        for number, task in enumerate(tasks):
             stop_if(cancelled, what)
             take(number, work(task))
         return
-    orders: SimpleQueue[Any] = SimpleQueue()
-    answers: SimpleQueue[Any] = SimpleQueue()
-    overseer = threading.Thread(target=_oversee, args=(work, what, orders, answers), daemon=True)
+    pool = _Pool(workers, what)
     try:
-        overseer.start()
+        pool.begin()
+        for number, result in pool.results(work, tasks, cancelled):
+            take(number, result)
+    finally:
+        pool.end()
+
+
+@contextmanager
+def shared_workers(workers: int, what: str) -> Iterator[None]:
+    """Within the block ``side_by_side`` uses so many processes, which end with the block; one: this process.
+
+    ``what`` as in ``work_off``.
+    """
+    if workers == 1:
+        yield
+        return
+    pool = _Pool(workers, what)
+    token = _shared.set(pool)
+    try:
+        pool.begin()
+        yield
+    finally:
+        _shared.reset(token)
+        pool.end()
+
+
+def side_by_side(
+    work: Callable[[Task, Cancel | None], Result], tasks: Sequence[Task], cancelled: Cancel | None = None
+) -> Iterator[Result]:
+    """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` around the call. Where
+    there are none, and in a worker, this process does it, each when it is asked for.
+
+    ``work`` as in ``work_off``; it is also told when to stop, unless in a worker, which is ended. Whoever
+    asks for no further result leaves the rest undone. Raises Cancelled, WorkerDied, and of what ``work``
+    raises the error of the first task.
+    """
+    pool = _shared.get()
+    if pool is None or len(tasks) < 2:
+        for task in tasks:
+            yield work(task, cancelled)
+        return
+    early: dict[int, Result | Exception] = {}
+    wanted = 0
+    for number, result in pool.results(partial(_result_or_error, work), tasks, cancelled):
+        early[number] = result
+        while wanted in early:
+            found = early.pop(wanted)
+            if isinstance(found, Exception):
+                raise found
+            yield found
+            wanted += 1
+
+
+def _result_or_error(work: Callable[[Task, None], Result], task: Task) -> Result | Exception:
+    """What tasks raise comes in their order, too."""
+    try:
+        return work(task, None)
+    except Exception as error:
+        return _portable(error)
+
+
+_STOP = None
+
+
+@dataclass(frozen=True)
+class _Order:
+    work: Callable[[Any], Any]
+    number: int
+    task: Any
+    answers: SimpleQueue[Any]
+
+    def answer(self, result: Any, error: BaseException | None = None) -> None:
+        self.answers.put((self.number, result, error))
+
+
+class _Pool:
+    """Processes that are begun when an order needs one, for several calls."""
+
+    def __init__(self, workers: int, what: str) -> None:
+        self._workers, self._what = workers, what
+        self._orders: SimpleQueue[Any] = SimpleQueue()
+        self._ended: SimpleQueue[Any] = SimpleQueue()
+        self._overseer = threading.Thread(target=self._oversee, daemon=True)
+
+    def begin(self) -> None:
+        self._overseer.start()
+
+    def end(self) -> None:
+        self._orders.put(_STOP)
+        if self._overseer.ident is not None:  # else it has begun no worker
+            self._ended.get()
+
+    def results(
+        self, work: Callable[[Task], Result], tasks: Iterable[Task], cancelled: Cancel | None
+    ) -> Iterator[tuple[int, Result]]:
+        """The number and the result of each task, in any order."""
+        answers: SimpleQueue[Any] = SimpleQueue()
+        orders = (_Order(work, number, task, answers) for number, task in enumerate(tasks))
         unanswered = 0
-        for order in islice(numbered, workers):
-            orders.put(order)
+        for order in islice(orders, self._workers):
+            self._orders.put(order)
             unanswered += 1
         while unanswered:
-            stop_if(cancelled, what)
+            stop_if(cancelled, self._what)
             try:
                 number, result, error = answers.get(timeout=POLL_S)
             except Empty:
@@ -98,53 +196,55 @@ def work_off(
             if error is not None:
                 raise error
             unanswered -= 1
-            for order in islice(numbered, 1):
-                orders.put(order)
+            for order in islice(orders, 1):
+                self._orders.put(order)
                 unanswered += 1
-            take(number, result)
-    finally:
-        orders.put(_STOP)
-        while overseer.ident is not None and answers.get() is not _STOP:  # else it has begun no worker
-            pass
+            yield number, result
+
+    def _oversee(self) -> None:
+        """Hand each order to a worker that is free, or to a new one; at ``_STOP`` end all of them."""
+        workers: list[_Worker] = []
+        free: list[_Worker] = []
+        waiting: deque[_Order] = deque()
+        try:
+            while (order := self._orders.get()) is not _STOP:
+                if isinstance(order, _Worker):
+                    free.append(order)
+                else:
+                    waiting.append(order)
+                while waiting and (free or len(workers) < self._workers):
+                    if not free:
+                        free.append(_Worker(self._what, self._orders))
+                        workers.append(free[-1])
+                    free.pop().orders.put(waiting.popleft())
+        except BaseException as error:
+            for order in waiting:
+                order.answer(None, error)
+            while (order := self._orders.get()) is not _STOP:
+                if isinstance(order, _Order):
+                    order.answer(None, error)
+        finally:
+            for worker in workers:
+                worker.kill()
+            for worker in workers:
+                worker.thread.join()
+            self._ended.put(_STOP)
 
 
-_STOP = None
-
-
-def _oversee(work: object, what: str, orders: SimpleQueue[Any], answers: SimpleQueue[Any]) -> None:
-    """Hand each order to a worker that is free, or to a new one; at ``_STOP`` end all of them."""
-    workers: list[_Worker] = []
-    free: list[_Worker] = []
-    try:
-        while (order := orders.get()) is not _STOP:
-            if isinstance(order, _Worker):
-                free.append(order)
-                continue
-            if not free:
-                free.append(_Worker(work, what, orders, answers))
-                workers.append(free[-1])
-            free.pop().orders.put(order)
-    except BaseException as error:
-        answers.put((0, None, error))
-        while orders.get() is not _STOP:
-            pass
-    finally:
-        for worker in workers:
-            worker.kill()
-        for worker in workers:
-            worker.thread.join()
-        answers.put(_STOP)
+_shared: ContextVar[_Pool | None] = ContextVar("shared workers", default=None)
 
 
 class _Worker:
     """A process and the thread that talks to it. Puts itself into ``frees`` when it has answered."""
 
-    def __init__(self, work: object, what: str, frees: SimpleQueue[Any], answers: SimpleQueue[Any]) -> None:
+    def __init__(self, what: str, frees: SimpleQueue[Any]) -> None:
         self.orders: SimpleQueue[Any] = SimpleQueue()
-        self._what, self._frees, self._answers = what, frees, answers
+        self._what, self._frees = what, frees
         self._process: subprocess.Popen[bytes] | None = None
+        self._work: object = None
+        """That the process was sent last."""
         self._killed = False
-        self.thread = threading.Thread(target=self._run, args=(work,), daemon=True)
+        self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
     def kill(self) -> None:
@@ -153,29 +253,31 @@ class _Worker:
         if self._process is not None:
             self._process.kill()
 
-    def _run(self, work: object) -> None:
-        number = 0
+    def _run(self) -> None:
         try:
-            process = self._process = _begin()
+            while (order := self.orders.get()) is not _STOP:
+                result, error = self._worked_off(order)
+                self._frees.put(self)
+                order.answer(result, error)
+        finally:
+            if self._process is not None:
+                _end(self._process)
+
+    def _worked_off(self, order: _Order) -> tuple[Any, BaseException | None]:
+        try:
+            process = self._process = self._process or _begin()
             if self._killed:  # too early for it to see the process
                 process.kill()
             assert process.stdin is not None
             assert process.stdout is not None
-            pickle.dump([place for place in sys.path if isinstance(place, str)], process.stdin)
-            _send(process.stdin, work)
-            while (order := self.orders.get()) is not _STOP:
-                number, task = order
-                _send(process.stdin, task)
-                result, error = pickle.loads(_received(process.stdout))
-                self._frees.put(self)
-                self._answers.put((number, result, error))
+            _send(process.stdin, (None if order.work is self._work else order.work, order.task))
+            result, error = pickle.loads(_received(process.stdout))
+            self._work = order.work if error is None else None
         except (OSError, EOFError):
-            self._answers.put((number, None, WorkerDied(self._how_it_ended())))
+            return None, WorkerDied(self._how_it_ended())
         except BaseException as error:
-            self._answers.put((number, None, error))
-        finally:
-            if self._process is not None:
-                _end(self._process)
+            return None, error
+        return result, error
 
     def _how_it_ended(self) -> str:
         if self._process is None:
@@ -188,13 +290,19 @@ class _Worker:
 
 
 def _begin() -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-P", "-c", _PROGRAM],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         process_group=0,
         creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # the same for Windows
     )
+    try:
+        pickle.dump([place for place in sys.path if isinstance(place, str)], process.stdin)
+    except BaseException:
+        _end(process)
+        raise
+    return process
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -247,12 +355,13 @@ def _serve(requests: BinaryIO) -> None:
     received: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_receive, args=(requests, received), daemon=True).start()
     pin_blas_to_one_thread()
-    sent_work, work = received.get(), None
+    work: Any = None
     while True:
-        sent_task = received.get()
+        sent = received.get()
         try:
-            work = work or pickle.loads(sent_work)
-            answer = pickle.dumps((work(pickle.loads(sent_task)), None), pickle.HIGHEST_PROTOCOL)
+            new_work, task = pickle.loads(sent)
+            work = new_work or work
+            answer = pickle.dumps((work(task), None), pickle.HIGHEST_PROTOCOL)
         except Exception as error:
             answer = pickle.dumps((None, _portable(error)))
         _send_bytes(answers, answer)

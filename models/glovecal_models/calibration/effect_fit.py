@@ -36,6 +36,7 @@ from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.fast_lmc import LmcOptimum
 from glovecal_models.regression.regressor import Regressor
+from glovecal_models.worker_processes import side_by_side
 
 MOST_TURNS = 4
 MOST_WEIGHT_TURNS = 5
@@ -89,12 +90,12 @@ def fit_with_effects(
 
     def trained() -> None:
         known = optima[min(len(found), len(optima) - 1)] if optima else {}
+        tasks = []
         for name in rotations:
-            stop_if(cancelled, "adding an effect")
             # Only its own: the same fit is known again whatever other rotations are trained beside.
             own = ((name, known[name]),) if name in known else ()
-            chosen = replace(settings, optima=own)
-            results[name] = _trained(takes, columns[name], corrected.get(name), chosen, cancelled)
+            tasks.append(_task(takes, columns[name], corrected.get(name), replace(settings, optima=own)))
+        results.update(zip(rotations, KNOWN_FITS.fit(tasks, cancelled=cancelled), strict=True))
         found.append(found_optima({name: item.settings for name, item in results.items()}))
 
     def own_signals() -> dict[str, OwnSignal]:
@@ -176,14 +177,13 @@ def correspondence_for(takes: PreparedTakes, rotation: str, settings: TrainingSe
     return correspondence_by(settings.method, item, takes.layout.sensors)
 
 
-def _trained(
+def _task(
     takes: PreparedTakes,
     correspondence: Correspondence,
     correction: list[np.ndarray] | None,
     settings: TrainingSettings,
-    cancelled: Cancel | None,
-) -> FitResult:
-    """The rotation's regressor, trained on the reference without the effects' part."""
+) -> FitTask:
+    """To train the rotation's regressor on the reference without the effects' part."""
     targets, inputs = takes.target(correspondence.rotation), takes.inputs(correspondence)
     if correction is not None:
         targets = [target - part for target, part in zip(targets, correction, strict=True)]
@@ -204,7 +204,7 @@ def _trained(
         joined_variances([variance for _, variance in found], [len(rows) for rows in known]),
     )
     palm = palm_samples(takes.takes, correspondence) if settings.method == "template" else None
-    return KNOWN_FITS.fit(task_for(correspondence, samples, None, settings, palm=palm), cancelled=cancelled)
+    return task_for(correspondence, samples, None, settings, palm=palm)
 
 
 def _explained(
@@ -242,20 +242,27 @@ class FitMemory:
         self._most, self._bytes, self._lock = most_bytes, 0, Lock()
         self._fits: OrderedDict[str, FitResult] = OrderedDict()
 
-    def fit(self, task: FitTask, *, cancelled: Cancel | None = None) -> FitResult:
-        """As ``run_task``, whose results are never changed. Raises NotTrainable, Cancelled."""
+    def fit(self, tasks: Sequence[FitTask], *, cancelled: Cancel | None = None) -> list[FitResult]:
+        """As ``run_task`` of each, whose results are never changed; side by side. Raises NotTrainable,
+        Cancelled."""
         with self._lock:
-            if task.key in self._fits:
-                self._fits.move_to_end(task.key)
-                return self._fits[task.key]
-        result = run_task(task, cancelled=cancelled)
+            known = {task.key: self._fits[task.key] for task in tasks if task.key in self._fits}
+        new = [task for task in tasks if task.key not in known]
+        for task, result in zip(new, side_by_side(_fitted, new, cancelled), strict=True):
+            known[task.key] = result
         with self._lock:
-            if task.key not in self._fits:
-                self._fits[task.key] = result
-                self._bytes += _size(result)
+            for key, result in known.items():
+                self._bytes += 0 if key in self._fits else _size(result)
+                self._fits[key] = result
+                self._fits.move_to_end(key)
             while self._bytes > self._most:
                 self._bytes -= _size(self._fits.popitem(last=False)[1])
-        return result
+        return [known[task.key] for task in tasks]
+
+
+def _fitted(task: FitTask, cancelled: Cancel | None) -> FitResult:
+    stop_if(cancelled, "adding an effect")
+    return run_task(task, cancelled)
 
 
 def _size(result: FitResult) -> int:

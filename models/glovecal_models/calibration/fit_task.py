@@ -75,7 +75,7 @@ class FitResult:
     """Wearings that were left out whole."""
 
 
-def run_task(task: FitTask, *, cancelled: Cancel | None = None, report: Report | None = None) -> FitResult:
+def run_task(task: FitTask, cancelled: Cancel | None = None, report: Report | None = None) -> FitResult:
     """Fit one task. Raises Cancelled when ``cancelled()`` turns true, NotTrainable."""
     regressor = _fit(task, cancelled, report)
     error = 0.0

@@ -1,15 +1,17 @@
 """Some takes left out, a calibration with its effects fitted on the others: its errors on those left out.
 
-One engine for all who ask: ``fits_without``. Masks over takes (``folds.py``) say what is left out: takes,
+One engine for all who ask: ``measured_without``. Masks over takes (``folds.py``) say what is left out: takes,
 wearings, or pieces of takes. Whether a part without which no model can be trained is passed over or ends the
-question is each one's own choice.
+question is each one's own choice. Fits without different takes know nothing of each other, and are made side
+by side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -35,6 +37,9 @@ from glovecal_models.calibration.training_settings import TrainingSettings, left
 from glovecal_models.calibration.unseen_wearing import LeftOutWearing
 from glovecal_models.errors import NotTrainable
 from glovecal_models.progress import Cancel, Report
+from glovecal_models.worker_processes import side_by_side
+
+Measured = TypeVar("Measured")
 
 
 @dataclass(frozen=True)
@@ -73,17 +78,19 @@ class TakeErrors(NamedTuple):
 
 
 class FitWithout(NamedTuple):
-    """A fit, and the takes that it has not seen."""
+    """A fit of some rotations, and the takes that it has not seen."""
 
     fit: EffectFit
+    kept: PreparedTakes
     left: PreparedTakes
-    number: int
-    """Of the mask that says what is left out."""
+    rotations: Sequence[str]
+    settings: TrainingSettings
 
 
-def fits_without(
+def measured_without(
+    measure: Callable[[FitWithout], Measured],
     takes: PreparedTakes,
-    masks: Iterable[np.ndarray],
+    masks: Sequence[np.ndarray],
     rotations: Sequence[str],
     wanted: Sequence[EffectRequest],
     settings: TrainingSettings,
@@ -92,24 +99,40 @@ def fits_without(
     is_optional: bool = True,
     before_each: Callable[[int], None] | None = None,
     cancelled: Cancel | None = None,
-) -> Iterator[FitWithout]:
-    """A fit without the takes of each of ``masks`` (T,). Raises Cancelled.
+) -> Iterator[tuple[int, Measured]]:
+    """For each of ``masks`` (T,), in their order, its number and ``measure`` of a fit without its takes.
+    Raises Cancelled, WorkerDied.
 
-    ``optima`` of the fit on all takes, where it is known (``fit_with_effects``). ``is_optional``: what cannot
-    carry a model without a mask's takes says nothing about the error and is passed over; else NotTrainable is
-    raised.
+    ``measure`` can be imported, or is a ``partial``. ``optima`` of the fit on all takes, where it is known
+    (``fit_with_effects``). ``is_optional``: what cannot carry a model without a mask's takes says nothing
+    about the error and is passed over; else NotTrainable is raised.
     """
-    for number, held in enumerate(masks):
+    recipe = takes, tuple(rotations), tuple(wanted), settings, optima
+    results = side_by_side(partial(_measured, measure, recipe, is_optional), masks, cancelled)
+    for number in range(len(masks)):
         if before_each:
             before_each(number)
-        kept = takes.some(np.flatnonzero(~held).tolist())
-        try:
-            fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
-        except NotTrainable:
-            if not is_optional:
-                raise
-            continue
-        yield FitWithout(fit, takes.some(np.flatnonzero(held).tolist()), number)
+        found = next(results)
+        if found is not None:
+            yield number, found
+
+
+def _measured(
+    measure: Callable[[FitWithout], Measured],
+    recipe: tuple[PreparedTakes, Sequence[str], Sequence[EffectRequest], TrainingSettings, Optima],
+    is_optional: bool,
+    held: np.ndarray,
+    cancelled: Cancel | None,
+) -> Measured | None:
+    takes, rotations, wanted, settings, optima = recipe
+    kept, left = (takes.some(np.flatnonzero(mask).tolist()) for mask in (~held, held))
+    try:
+        fit = fit_with_effects(kept, rotations, wanted, settings, optima=optima, cancelled=cancelled)
+    except NotTrainable:
+        if not is_optional:
+            raise
+        return None
+    return measure(FitWithout(fit, kept, left, rotations, settings))
 
 
 def held_out_errors(
@@ -157,15 +180,22 @@ def held_out_errors(
             told = f", error so far {so_far:.2f} degrees" if at else ""
             report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
 
-    for fit, left, _ in fits_without(
-        parts, folds, rotations, wanted, settings, optima=optima, before_each=before_each, cancelled=cancelled
-    ):
-        for name, errors in errors_of(fit, left, rotations, settings).items():
-            square[name] += float(errors @ errors)
-            count[name] += len(errors)
+    for _, found in measured_without(
+        _summed_errors, parts, folds, rotations, wanted, settings,
+        optima=optima, before_each=before_each, cancelled=cancelled,
+    ):  # fmt: skip
+        for name in rotations:
+            square[name] += found.square[name]
+            count[name] += found.count[name]
         if sum(square.values()) > most_square:
             break
     return HeldOutErrors(square, count)
+
+
+def _summed_errors(of: FitWithout) -> HeldOutErrors:
+    errors = errors_of(of.fit, of.left, of.rotations, of.settings)
+    square = {name: float(each @ each) for name, each in errors.items()}
+    return HeldOutErrors(square, {name: len(each) for name, each in errors.items()})
 
 
 def held_out_take_errors(
@@ -179,8 +209,8 @@ def held_out_take_errors(
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> TakeErrors:
-    """Whole takes are left out in so many ``folds``. ``optima`` as in ``fits_without``. Raises NotTrainable,
-    Cancelled.
+    """Whole takes are left out in so many ``folds``. ``optima`` as in ``measured_without``. Raises
+    NotTrainable, Cancelled.
     """
     count = len(takes.takes)
     parts = folds_over_takes(np.arange(count), folds)
@@ -190,16 +220,20 @@ def held_out_take_errors(
         if report:
             report(f"leaving out {parts[at].sentence}", at / len(parts))
 
-    for fit, left, number in fits_without(
-        takes, [part.held_out for part in parts], rotations, wanted, settings,
+    for number, of in measured_without(
+        _take_errors, takes, [part.held_out for part in parts], rotations, wanted, settings,
         optima=optima, is_optional=False, before_each=before_each, cancelled=cancelled,
     ):  # fmt: skip
-        held = np.flatnonzero(parts[number].held_out).tolist()
-        fit = with_leads(fit, takes.some(np.flatnonzero(~parts[number].held_out).tolist()), settings)
-        for errors, of in zip(found, (frame_errors_of, offline_errors_of), strict=True):
-            for at, part in zip(held, of(fit, left, rotations, settings), strict=True):
+        for errors, mine in zip(found, of, strict=True):
+            for at, part in zip(np.flatnonzero(parts[number].held_out).tolist(), mine, strict=True):
                 errors[at] = part
     return found
+
+
+def _take_errors(of: FitWithout) -> TakeErrors:
+    of = of._replace(fit=with_leads(of.fit, of.kept, of.settings))
+    own = of.fit, of.left, of.rotations, of.settings
+    return TakeErrors(frame_errors_of(*own), offline_errors_of(*own))
 
 
 def errors_of(
@@ -277,16 +311,26 @@ def left_out_wearings(
 ) -> list[LeftOutWearing]:
     """Empty with a single wearing. ``optima`` as in ``held_out_errors``. Raises Cancelled."""
     wearings = [take.wearing for take in takes.takes]
-    settings, found, groups = left_out_settings(settings), [], wearing_groups(wearings)
+    groups = wearing_groups(wearings)
     masks = [np.array([name in group for name in wearings]) for group in groups]
-    for fit, _, number in fits_without(
-        takes, masks, rotations, wanted, settings, optima=optima, cancelled=cancelled
-    ):
-        trained = len(set(wearings) - set(groups[number]))
-        for wearing in groups[number]:
-            left = takes.some([at for at, name in enumerate(wearings) if name == wearing])
-            found += _left_out(fit, left, rotations, settings, wearing, trained)
-    return found
+    found = measured_without(
+        _left_out_wearings, takes, masks, rotations, wanted, left_out_settings(settings),
+        optima=optima, cancelled=cancelled,
+    )  # fmt: skip
+    return [item for _, of_group in found for item in of_group]
+
+
+def _left_out_wearings(of: FitWithout) -> list[LeftOutWearing]:
+    wearings = [take.wearing for take in of.left.takes]
+    trained = len({take.wearing for take in of.kept.takes})
+    return [
+        item
+        for wearing in dict.fromkeys(wearings)
+        for item in _left_out(
+            of.fit, of.left.some([at for at, name in enumerate(wearings) if name == wearing]),
+            of.rotations, of.settings, wearing, trained,
+        )
+    ]  # fmt: skip
 
 
 def _left_out(

@@ -148,8 +148,11 @@ def _cells(samples: Samples, count: int) -> np.ndarray:
     space = np.column_stack([samples.inputs, samples.target])
     low, high = space.min(axis=0), space.max(axis=0)
     unit = (space - low) / np.where(high > low, high - low, 1.0)
-    cells = samples.take
-    for divisions in (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128):
+    cells, takes = samples.take, int(samples.take.max()) + 1
+    each = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128)
+    # Of grids with no more cells than that, the finest comes next in any case.
+    coarse = sum(takes * divisions ** space.shape[1] <= count for divisions in each)
+    for divisions in each[max(coarse - 1, 0) :]:
         finer = _numbered(samples.take, np.floor(unit * divisions * (1 - 1e-12)), divisions)
         if finer.max() >= count:
             break

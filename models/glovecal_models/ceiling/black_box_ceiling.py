@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -42,6 +43,7 @@ from glovecal_models.effects.base.effect import Effect
 from glovecal_models.effects.catalogue import catalogue
 from glovecal_models.progress import Cancel, Report, part, stop_if
 from glovecal_models.takes.take import Take
+from glovecal_models.worker_processes import side_by_side
 
 WORTH_CONTROLS = 0.005
 """Share of the squared error; a box that gains less needs no controls."""
@@ -102,26 +104,43 @@ def _of_errors(
 ) -> Ceiling:
     wearings = [take.wearing for take in prepared.takes]
     order = exchange_order(wearings, np.random.default_rng(seed))
-    columns: dict[tuple[int, ...], list[TakeColumns]] = {}
     boxes: dict[str, _Boxes] = {}
+    each = [
+        (name, TakeErrors(*([take[:, [at]] for take in takes] for takes in errors)))
+        for at, name in enumerate(names)
+    ]
+    found = side_by_side(partial(_boxes_of, prepared, order, seed), each, cancelled)
     for number, name in enumerate(names):
-        stop_if(cancelled, "the ceiling")
         if report:
             report(f"black box on {name}", 0.25 + 0.75 * number / len(names))
-        own = _own_sensors(prepared, name)
-        if own not in columns:
-            scale = np.concatenate(prepared.readings).std(axis=0)
-            scale = np.where(scale > 0, scale, 1.0)
-            columns[own] = recorded_columns(prepared.takes, prepared.readings, own, scale)
-        live = [error[:, number] for error in errors.live]
-        rows = RotationRows.of(columns[own], prepared, live, order, own)
-        if rows is not None:
-            offline = np.concatenate([error[:, number] for error in errors.offline])
-            boxes[name] = replace(_boxes(rows, seed), offline_square=float(np.nanmean(offline**2)))
+        of_rotation = next(found)
+        if of_rotation is not None:
+            boxes[name] = of_rotation
     if not boxes:
         why = f"no rotation was measured in {limits.fewest_takes} takes"
         return _undecided(why, len(prepared.takes), limits)
     return _summed_up(boxes, prepared, seed, limits)
+
+
+def _boxes_of(
+    prepared: PreparedTakes,
+    order: Sequence[int],
+    seed: int,
+    rotation: tuple[str, TakeErrors],
+    cancelled: Cancel | None,
+) -> _Boxes | None:
+    """Of a rotation by its name and its errors, each (N, 1); None where a take did not measure it."""
+    stop_if(cancelled, "the ceiling")
+    name, errors = rotation
+    own = _own_sensors(prepared, name)
+    scale = np.concatenate(prepared.readings).std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    columns = recorded_columns(prepared.takes, prepared.readings, own, scale)
+    rows = RotationRows.of(columns, prepared, [error[:, 0] for error in errors.live], order, own)
+    if rows is None:
+        return None
+    offline = np.concatenate([error[:, 0] for error in errors.offline])
+    return replace(_boxes(rows, seed), offline_square=float(np.nanmean(offline**2)))
 
 
 @dataclass(frozen=True)

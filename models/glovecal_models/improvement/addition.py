@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,12 @@ from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest,
 from glovecal_models.calibration.correction_parts import IntervalInflation
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.effect_fit import (
-    EffectFit,
     Optima,
     correspondence_for,
     optima_of,
 )
 from glovecal_models.calibration.folds import folds_over_takes
-from glovecal_models.calibration.leave_out import HeldOutErrors, fits_without
+from glovecal_models.calibration.leave_out import FitWithout, HeldOutErrors, measured_without
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training_settings import TrainingSettings, trained_rotations
@@ -308,23 +308,16 @@ def claimed_errors(
             f"the claimed interval is checked on held-out takes; {len(takes.takes)} were given,"
             f" {fewest} are needed"
         )
-    found: list[ClaimedErrors] = []
     folds = folds_over_takes(np.arange(len(takes.takes)), max(settings.folds, 2))
-    for fit, left, _ in fits_without(
-        takes, [fold.held_out for fold in folds], rotations, wanted, settings,
+    found = measured_without(
+        partial(_errors_of, wanted), takes, [fold.held_out for fold in folds], rotations, wanted, settings,
         optima=optima, is_optional=False, cancelled=cancelled,
-    ):  # fmt: skip
-        found += _errors_of(fit, left, rotations, wanted, settings)
-    return tuple(found)
+    )  # fmt: skip
+    return tuple(item for _, of_fold in found for item in of_fold)
 
 
-def _errors_of(
-    fit: EffectFit,
-    takes: PreparedTakes,
-    rotations: Sequence[str],
-    wanted: Sequence[EffectRequest],
-    settings: TrainingSettings,
-) -> list[ClaimedErrors]:
+def _errors_of(wanted: Sequence[EffectRequest], of: FitWithout) -> list[ClaimedErrors]:
+    fit, takes, rotations, settings = of.fit, of.left, of.rotations, of.settings
     correction = EffectCorrection(fit.effects, list(rotations), takes.scale)
     regressors = [fit.regressor(name) for name in rotations]
     noise = np.array([regressor.noise_variance for regressor in regressors])

@@ -54,6 +54,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import take_warnings
+from glovecal_models.worker_processes import shared_workers
 
 Stepped = Callable[[Sequence[Step]], None]
 
@@ -70,15 +71,18 @@ def improve(
     take_hashes: Sequence[str] = (),
     limits: ImprovementLimits = IMPROVEMENT_LIMITS,
     ceiling: bool = False,
+    workers: int = 1,
     cancelled: Cancel | None = None,
     report: Report | None = None,
     stepped: Stepped | None = None,
 ) -> Improvement:
-    """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled.
+    """Train, then add what the diagnosis names while it pays. Raises NotTrainable, BadInput, Cancelled,
+    WorkerDied.
 
     Takes that do not fit the others are set aside first. Errors are on ``holdout`` when given, else on
     held-out takes. ``ceiling``: see at the end whether anything is left to gain from what was recorded; needs
-    the extra ``ceiling`` of this package. ``stepped`` is given all steps so far after each.
+    the extra ``ceiling`` of this package. ``workers``: processes for what can be worked out side by side; the
+    result is the same whatever their number. ``stepped`` is given all steps so far after each.
     """
     settings = settings or TrainingSettings()
     odd = odd_takes(takes, layout)
@@ -89,10 +93,11 @@ def improve(
         takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
         cancelled, report, stepped,
     )  # fmt: skip
-    loop.start()
-    while len(loop.steps) <= max_steps and loop.go_on():
-        pass
-    return loop.finished(ceiling=ceiling)
+    with shared_workers(workers, "the improvement"):
+        loop.start()
+        while len(loop.steps) <= max_steps and loop.go_on():
+            pass
+        return loop.finished(ceiling=ceiling)
 
 
 @dataclass

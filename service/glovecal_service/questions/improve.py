@@ -21,6 +21,7 @@ from glovecal_service.questions.model_work import is_short, model_title
 from glovecal_service.questions.question import AsOption
 from glovecal_service.questions.training_takes import require_one_hand
 from glovecal_service.request_types import Identifier, StrictBody, SubjectName
+from glovecal_service.settings import Settings
 from glovecal_service.store import Store
 from glovecal_service.store.records import JobRecord, incomplete_sentences
 
@@ -157,6 +158,7 @@ def run(work: ImprovementWork, cancelled: Callable[[], bool], report: TaskReport
         seed=asked.seed,
         take_hashes=work.take_hashes,
         ceiling=asked.ceiling,
+        workers=Settings().workers or 1,
         cancelled=cancelled,
         report=say,
         stepped=stepped,

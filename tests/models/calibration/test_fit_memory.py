@@ -21,22 +21,23 @@ def _task(slope: float) -> FitTask:
 
 def test_the_same_samples_are_fitted_once() -> None:
     memory = FitMemory()
-    first = memory.fit(_task(0.3))
-    assert memory.fit(_task(0.3)) is first
-    assert memory.fit(_task(0.4)) is not first
+    [first] = memory.fit([_task(0.3)])
+    again, other = memory.fit([_task(0.3), _task(0.4)])
+    assert again is first
+    assert other is not first
 
 
 def test_the_longest_unused_fit_is_forgotten() -> None:
     memory = FitMemory(most_bytes=0)
-    first = memory.fit(_task(0.3))
-    again = memory.fit(_task(0.3))
+    [first] = memory.fit([_task(0.3)])
+    [again] = memory.fit([_task(0.3)])
     assert again is not first
     for name, array in first.arrays.items():
         np.testing.assert_array_equal(array, again.arrays[name])
 
 
 def test_the_mean_alone_is_that_of_the_prediction() -> None:
-    fit = FitMemory().fit(_task(0.3))
+    [fit] = FitMemory().fit([_task(0.3)])
     regressor = restore_regressor(fit.arrays, fit.settings)
     inputs = np.linspace(10.0, 240.0, 5000)[:, None]
     np.testing.assert_allclose(regressor.mean(inputs), regressor.predict(inputs).mean, rtol=0, atol=1e-12)
