@@ -1,5 +1,8 @@
 """Tasks worked off by processes of our own, which end with the call, whatever ends it.
 
+``work_off`` has processes for one kind of work; ``side_by_side`` asks those that some caller further out has
+begun, so that work whose parts know nothing of each other says so in one place and takes no number along.
+
 Not ``concurrent.futures``, nor a library built like it (loky, joblib): there the caller's thread shares locks
 with the threads that serve the pipes, and a Ctrl-C or a killed worker can leave one taken: the call never
 returns. Here the caller's thread only uses queues written in C, in which Ctrl-C leaves nothing half done; all
@@ -102,12 +105,14 @@ def shared_workers(workers: int, what: str) -> Iterator[None]:
         yield
         return
     pool = _Pool(workers, what)
-    token = _shared.set(pool)
     try:
         pool.begin()
-        yield
+        token = _shared.set(pool)
+        try:
+            yield
+        finally:
+            _shared.reset(token)
     finally:
-        _shared.reset(token)
         pool.end()
 
 
@@ -298,6 +303,7 @@ def _begin() -> subprocess.Popen[bytes]:
         creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # the same for Windows
     )
     try:
+        assert process.stdin is not None
         pickle.dump([place for place in sys.path if isinstance(place, str)], process.stdin)
     except BaseException:
         _end(process)
