@@ -69,7 +69,9 @@ def camera_errors(problem: DiagnosisProblem, takes: Sequence[Take]) -> CameraErr
     errors = tuple(_joint_errors(without, with_it, control, joint) for joint in chosen)
     names = tuple(without.rotations[joint] for joint in chosen)
     nothing = tuple(np.empty(0) for _ in names)
-    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=problem.limits)
+    # It is blamed as soon as may be, few takes or not: every camera errs.
+    limits = replace(problem.limits, few_takes=0)
+    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=limits)
     return CameraErrors(found, {name: stated[name] for name in names}, covered_ranges(takes, names))
 
 

@@ -109,7 +109,10 @@ class DiagnosisLimits(SignificanceLimits):
     )
     slow_shortest_s: int = limit(4, "s", "A shorter take says nothing of a slow error.", CHOSEN)
     slow_confidence: float = limit(
-        0.95, "probability", "Of the one-sided lower bound of a slow error.", "The usual level."
+        0.95,
+        "probability",
+        "Of the one-sided lower bounds of the slow errors of all joints together.",
+        "The usual level.",
     )
     slow_least_freedom: float = limit(
         1.0,

@@ -138,13 +138,14 @@ def _few_takes(
     alike = limits.alike_context_share
     column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name, alike)))
     levels = _levels(takes, column, alike)
-    ways, needed = _arrangements(levels), ceil(1 / effect.comparison.certainty.clear)
+    certainty, count = effect.comparison.certainty, sum(levels)
+    least = certainty.of_few_takes if count < limits.few_takes else certainty.clear
+    ways, needed = _arrangements(levels), ceil(1 / least)
     if ways >= needed:
         return None
     more = 1
     while _arrangements([*levels, *([1] * more)]) < needed:
         more += 1
-    count = sum(levels)
     takes_so_far = (
         f"{count} take{'s' if count != 1 else ''} with {len(levels)} value{'s' * (len(levels) != 1)}"
     )

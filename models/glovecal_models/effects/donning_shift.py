@@ -63,7 +63,10 @@ class DonningShift(WearingEffect):
     comparison = EffectComparison(
         "permuted wearings",
         certainty=Certainty(
-            clear=0.04, faint=0.01, why="there is one column of wearings, but context columns have many names"
+            clear=0.04,
+            faint=0.01,
+            of_few_takes=0.04,
+            why="there is one column of wearings, but context columns have many names",
         ),
     )
     further = FurtherCurves()

@@ -33,7 +33,7 @@ class Nonlinearity(InstantEffect):
         shows_in=("angle",),
         shown_by=RAMPS,
     )
-    comparison = EffectComparison("circularly shifted")
+    comparison = EffectComparison("circularly shifted", is_in_every_glove=True)
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if not takes:

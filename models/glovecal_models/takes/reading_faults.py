@@ -21,6 +21,8 @@ SPIKE_SPREADS = 8.0
 """Times the robust spread of what a median over five frames takes away."""
 JUMP_SHARE = 0.2
 """Of the range, within one frame: no finger does this."""
+LEAST_STEPS = 3.0
+"""Of the converter: a joint that hardly moves, read coarsely, goes through its range in few steps."""
 STUCK_S, STUCK_FRAMES = 1.0, 20
 GRADUAL_SHARE = 0.04
 """Of the range: this close to an end a sensor that stands still may be saturated instead."""
@@ -56,9 +58,7 @@ def spikes(time_s: np.ndarray, readings: np.ndarray, span: float, asked: np.ndar
     away = np.abs(readings - median_of_five(np.pad(readings, 2, mode="edge")))
     if float(away.max()) <= least:
         return np.zeros(len(readings), dtype=bool)
-    spread = 1.4826 * float(np.median(away))
-    limit = max(SPIKE_SPREADS * spread, 3.0 * smallest_step(readings), least)
-    found = away > limit
+    found = away > max(_least_of_noise(readings), least)
     # Where a level changes for good, the frames beside the step are no spikes.
     found &= ~_longer_than(found, 2)
     if not found.any():
@@ -71,6 +71,17 @@ def spikes(time_s: np.ndarray, readings: np.ndarray, span: float, asked: np.ndar
         elif shown >= MADE_SHARE * float(away[first:after].max()):
             found[first:after] = False
     return found
+
+
+def _least_of_noise(readings: np.ndarray) -> float:
+    """What noise and the converter's steps do not reach in (N,) readings, at least five.
+
+    The range of a joint that hardly moves is that of its noise.
+    """
+    away = np.abs(readings - median_of_five(np.pad(readings, 2, mode="edge")))
+    # The median of noise of about one step is 0.
+    spread = max(1.4826 * float(np.median(away)), 1.2533 * float(np.mean(away)))
+    return max(SPIKE_SPREADS * spread, LEAST_STEPS * smallest_step(readings))
 
 
 def _shown(time_s: np.ndarray, moved: np.ndarray, first: int, after: int) -> float:
@@ -119,6 +130,9 @@ def dropouts(time_s: np.ndarray, readings: np.ndarray, span: float, asked: np.nd
     left = np.abs(readings[end] - readings[end - 1])
     step = np.minimum(entered, left)
     jumps = step > JUMP_SHARE * span
+    if not jumps.any():
+        return found
+    jumps &= step > _least_of_noise(readings)
     steps = np.abs(np.diff(asked, prepend=np.nan))
     for first, after, height in zip(start[jumps], end[jumps], step[jumps], strict=True):
         shown = _shown(time_s, steps, first, after + 1)

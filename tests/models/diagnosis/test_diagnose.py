@@ -41,12 +41,13 @@ def test_a_clean_glove_is_left_alone(clean):
     assert [item.rmse_deg for item in found.assessments] == [item.rmse_deg for item in again.assessments]
 
 
-@pytest.mark.parametrize("seed", [11, 12])
-def test_two_measurements_of_one_angle_are_no_cross_coupling(seed):
+@pytest.mark.parametrize(("seed", "takes_per_wearing"), [(11, 3), (12, 5)])
+def test_two_measurements_of_one_angle_are_no_cross_coupling(seed, takes_per_wearing):
     """PIP and DIP joints bend together: of two noisy angles each says something of the other's sensor."""
     sensors = ("I_MCP", "M_PIP", "M_DIP")
     layout = Layout.from_columns("three", sensors, sensors)
-    takes = record_session(SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=3, take_s=20.0)).takes
+    plan = SessionPlan(seed=seed, sensors=sensors, takes_per_wearing=takes_per_wearing, take_s=20.0)
+    takes = record_session(plan).takes
     assert diagnose(takes, layout).named is None
     apart = replace(DIAGNOSIS_LIMITS, same_angle_share=0.0, same_angle_deg=0.0)
     named = diagnose(takes, layout, limits=apart).named

@@ -67,13 +67,19 @@ def test_what_is_asked_for_is_enough():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "ways", "more"),
-    [((20, 25), 2, 3), ((20, 22, 24, 26), 24, 1), ((20,) * 9 + (30,), 10, 1)],
+    ("degrees", "ways", "needed", "more"),
+    [
+        ((20, 25), 2, 200, 4),
+        ((20, 22, 24, 26), 24, 200, 2),
+        ((20,) * 9 + (30,), 10, 200, 2),
+        ((20,) * 19 + (30,), 20, 40, 1),
+    ],
 )
-def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, more):
+def test_few_takes_of_a_context_ask_for_other_values(degrees, ways, needed, more):
+    """More in few takes."""
     takes = signals("a" * len(degrees), degrees)
     found = why_not(takes, "temperature")
-    assert f"allow {ways} permutations, temperature needs 40" in found.why
+    assert f"allow {ways} permutations, temperature needs {needed} to" in found.why
     assert f"record {more} more take" in found.why
     added = [*degrees, *(40.0 + 5 * number for number in range(more))]
     assert undecidable(signals("a" * len(added), added), stored_correction("temperature", {})) is None

@@ -74,6 +74,19 @@ def test_without_a_reference_taps_are_no_fault_either(rate_hz):
             assert not dropouts(take.time_s, readings, span, unknown).any()
 
 
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_noise_and_coarse_steps_of_a_joint_that_rests_are_no_fault(rate_hz):
+    """Its range is that of its noise."""
+    random = np.random.default_rng(15)
+    time_s = np.arange(60.0 * rate_hz) / rate_hz
+    for noise in (0.3, 1.0, 3.0):
+        readings = np.round(100.0 + random.normal(0.0, noise, len(time_s)))
+        low, high = np.percentile(readings, (0.5, 99.5))
+        for asked in (np.full(len(time_s), np.nan), random.normal(0.0, 0.2 * noise, len(time_s))):
+            assert not spikes(time_s, readings, high - low, asked).any()
+            assert not dropouts(time_s, readings, high - low, asked).any()
+
+
 def test_without_a_reference_spikes_are_found_where_frames_come_fast_enough():
     takes = drummed(14, 120.0, spikes_per_s=0.5)
     hits = [

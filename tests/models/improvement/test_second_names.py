@@ -55,9 +55,9 @@ def test_what_a_form_leaves_is_not_named(sticky):
 
 
 def delay(square: float) -> Assessment:
-    """That saves 15 % of a joint's error of so many degrees squared, in 12 blocks of 5 s."""
-    base = np.full(12, 100 * square)
-    errors = JointErrors(base, 0.85 * base, 1.1 * base, 1200, np.repeat(np.arange(4), 3))
+    """That saves 15 % of a joint's error of so many degrees squared, in 36 blocks of 5 s."""
+    base = np.full(36, 100 * square)
+    errors = JointErrors(base, 0.85 * base, 1.1 * base, 3600, np.repeat(np.arange(12), 3))
     return Assessment("lag", ("I_PIP",), (errors,), (np.empty(0),), (np.empty(0),))
 
 

@@ -52,6 +52,18 @@ class JointErrors:
         return self.saved - max(self.control_saved, 0.0)
 
     @property
+    def contrast_of_several(self) -> float:
+        """``contrast`` without the take that saves most, which may be unlike all others; of one take or two
+        as it is."""
+        takes = np.unique(self.take)
+        if len(takes) < 3:
+            return self.contrast
+        saved = [self.beyond_control[self.take == take].sum() for take in takes]
+        rest = self.take != takes[int(np.argmax(saved))]
+        base = self.base[rest]
+        return saved_share(base, self.added[rest]) - max(saved_share(base, self.control[rest]), 0.0)
+
+    @property
     def beyond_control(self) -> np.ndarray:
         """(B,): what each block saves against the better of base and control."""
         return (self.base if self.control_saved <= 0 else self.control) - self.added
@@ -150,18 +162,30 @@ class Assessment:
         limits = self.limits
         if errors.contrast < limits.least_share:
             return False
+        rare_p_value = limits.rare_p_value
+        if self._has_few_takes and errors.contrast_of_several < limits.few_takes_large_share:
+            p_value, rare_p_value = (min(each, limits.few_takes_p_value) for each in (p_value, rare_p_value))
         if signed_rank(errors.beyond_control, limits.fewest_blocks) <= p_value:
             return True
         is_large = errors.contrast >= limits.rare_share
-        return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= limits.rare_p_value
+        return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= rare_p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
         is_clear = largest >= self.limits.clear_share
-        if p_value > (self.certainty.clear if is_clear else self.certainty.faint):
+        most = self.certainty.clear if is_clear else self.certainty.faint
+        if p_value > (min(most, self.certainty.of_few_takes) if self._has_few_takes else most):
             return ()
         least = self.limits.least_session_share
-        return tuple(i for i, item in enumerate(self.errors) if item.contrast >= least)
+        some = [i for i, item in enumerate(self.errors) if item.contrast >= least]
+        if self._has_few_takes:
+            some = [i for i in some if self.errors[i].contrast_of_several >= 0.5 * least]
+        return tuple(some)
+
+    @cached_property
+    def _has_few_takes(self) -> bool:
+        takes = np.unique(np.concatenate([item.take for item in self.errors])) if self.errors else ()
+        return len(takes) < self.limits.few_takes
 
     @property
     def saved_square(self) -> float:

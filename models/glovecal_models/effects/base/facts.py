@@ -108,6 +108,8 @@ class Certainty:
     """Where the effect saves a large share of the error."""
     faint: float
     """Where it saves less."""
+    of_few_takes: float
+    """Where there are few takes, whatever it saves."""
     why: str
     """What these limits rest on."""
 
@@ -115,6 +117,7 @@ class Certainty:
 BETWEEN_TAKES = Certainty(
     clear=0.025,
     faint=0.005,
+    of_few_takes=0.005,
     why="context columns have many names, and one of them goes along with the takes by chance",
 )
 

@@ -1,0 +1,48 @@
+"""Of few takes more certainty is asked: blocks of one take go together, and one take may be unlike all others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glovecal_models.effects.base.assessment import Assessment, JointErrors
+from glovecal_models.effects.base.facts import BETWEEN_TAKES
+
+BLOCKS_OF_A_TAKE = 4
+
+
+def assessed(takes: int, saved: np.ndarray, p_value: float | None = None) -> Assessment:
+    """An effect that saves shares (takes, 4) of the squared error of each block, and a control nothing."""
+    base = np.full(saved.size, 100.0)
+    take = np.repeat(np.arange(takes), BLOCKS_OF_A_TAKE)
+    errors = JointErrors(base, base * (1.0 - saved.ravel()), base, saved.size, take)
+    return Assessment("creep", ("I_PIP",), (errors,), (), (), p_value)
+
+
+def mostly(share: float, takes: int) -> np.ndarray:
+    """(takes, 4): every fourth block gets worse."""
+    return np.tile(share * np.array([1.5, 1.5, 1.5, -0.5]), (takes, 1))
+
+
+@pytest.mark.parametrize(("takes", "is_named"), [(6, False), (12, True)])
+def test_the_same_share_is_named_with_many_takes_alone(takes, is_named):
+    assert bool(assessed(takes, mostly(0.15, takes)).significant_joints) is is_named
+
+
+def test_a_large_share_needs_no_more_certainty_unless_one_take_has_it_all():
+    everywhere = mostly(0.6, 6)
+    alone = np.full((6, BLOCKS_OF_A_TAKE), 0.02)
+    alone[2] = 0.9
+    alone[:, 3] = -0.01
+    assert assessed(6, everywhere).significant_joints
+    assert not assessed(6, alone).significant_joints
+
+
+def test_a_column_that_goes_along_with_few_takes_is_chance_more_often():
+    everywhere = mostly(0.3, 12)
+    between = (BETWEEN_TAKES.of_few_takes, BETWEEN_TAKES.clear)
+    for p_value, takes, is_named in ((between[0], 6, True), (between[1], 6, False), (between[1], 12, True)):
+        assert bool(assessed(takes, everywhere[:takes], p_value).significant_joints) is is_named
+    alone = np.zeros((6, BLOCKS_OF_A_TAKE))
+    alone[2] = 0.9
+    assert not assessed(6, alone, between[0]).significant_joints
