@@ -1,4 +1,4 @@
-"""Of few takes more certainty is asked: blocks of one take go together, and one take may be unlike all others."""
+"""Few takes need more certainty: blocks of one take go together, and one take may be unlike all others."""
 
 from __future__ import annotations
 

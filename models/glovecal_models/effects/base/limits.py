@@ -44,8 +44,8 @@ class SignificanceLimits:
         "takes",
         "With fewer an effect is judged more strictly: blocks of one take go together, and one take may be"
         " unlike all others.",
-        "310 healthy simulated gloves of six takes of 20 s (2026-11-28): 17 % had an effect named, and of 80"
-        " of 16 takes none.",
+        "Of 150 healthy simulated gloves of six takes of 20 s (2026-11-28) 19 had an effect named, of 80 of"
+        " 12 takes and more none (2026-11-26).",
     )
     few_takes_p_value: float = limit(
         1e-5,
