@@ -70,8 +70,7 @@ def camera_errors(problem: DiagnosisProblem, takes: Sequence[Take]) -> CameraErr
     names = tuple(without.rotations[joint] for joint in chosen)
     nothing = tuple(np.empty(0) for _ in names)
     # It is blamed as soon as may be, few takes or not: every camera errs.
-    limits = replace(problem.limits, few_takes=0)
-    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=limits)
+    found = Assessment(CAMERA, names, errors, nothing, nothing, limits=problem.limits).as_of_many_takes
     return CameraErrors(found, {name: stated[name] for name in names}, covered_ranges(takes, names))
 
 

@@ -255,7 +255,7 @@ def _assessed(
         None,
         tuple(f"{item.name}_{item.unit}" for item in effect.shape.parameters),
         effect.comparison.certainty,
-        replace(design.limits, few_takes=0) if effect.comparison.is_in_every_glove else design.limits,
+        design.limits,
     )
     if not effect.comparison.changes_between_takes:
         return found

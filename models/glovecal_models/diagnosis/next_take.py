@@ -108,6 +108,19 @@ def undecidable(
     return _few_takes(takes, effect, limits) if effect.context else None
 
 
+def too_few(
+    takes: Sequence[Signals], faint: Sequence[Assessment], limits: DiagnosisLimits
+) -> list[NotIdentifiable]:
+    """What would be named if so much of it were seen in many takes, and the takes to record."""
+    more = max(limits.few_takes - len(takes), 1)
+    more_takes = _more(more)
+    why = f"{len(takes)} takes are too few to tell what may be saved from chance: record {more_takes}"
+    what = f"Record {more_takes} in free motion."
+    names = tuple(item.effect for item in faint)
+    record = asked_take(MORE_TAKES, what, _seconds(takes, more), (*names, "chance"))
+    return [NotIdentifiable(item.effect, why, record, item) for item in faint]
+
+
 def _few_wearings(
     takes: Sequence[Signals], effect: CorrectionEffect, limits: DiagnosisLimits
 ) -> Undecidable | None:
@@ -139,7 +152,7 @@ def _few_takes(
     column = max(effect.context, key=lambda name: _arrangements(_levels(takes, name, alike)))
     levels = _levels(takes, column, alike)
     certainty, count = effect.comparison.certainty, sum(levels)
-    least = certainty.of_few_takes if count < limits.few_takes else certainty.clear
+    least = min(certainty.clear, certainty.of_few_takes) if count < limits.few_takes else certainty.clear
     ways, needed = _arrangements(levels), ceil(1 / least)
     if ways >= needed:
         return None
@@ -149,13 +162,17 @@ def _few_takes(
     takes_so_far = (
         f"{count} take{'s' if count != 1 else ''} with {len(levels)} value{'s' * (len(levels) != 1)}"
     )
-    more_takes = f"{more} more take{'s' if more > 1 else ''}"
+    more_takes = _more(more)
     why = (
         f"{takes_so_far} of c.{column} allow {_permutations(ways)}, {effect.name} needs {needed} to be"
         f" significant: record {more_takes}, each at another value of c.{column}"
     )
     what = f"Record {more_takes} in free motion, each at another value of c.{column} than all before."
     return Undecidable(why, asked_take(MORE_TAKES, what, _seconds(takes, more), (effect.name, "chance")))
+
+
+def _more(takes: int) -> str:
+    return f"{takes} more take{'s' if takes > 1 else ''}"
 
 
 def _levels(takes: Sequence[Signals], column: str, equal: float) -> list[int]:

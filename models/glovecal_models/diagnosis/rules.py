@@ -25,7 +25,7 @@ from glovecal_models.diagnosis.naming import (
     with_known_saved,
     with_other_share,
 )
-from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable, as_known
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable, as_known, too_few
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import (
     are_held_levels,
@@ -229,6 +229,23 @@ def undecidable_first(state: State) -> State:
     for rule in ASSESSING:
         again = applied(rule, again)
     return replace(again, question=state.question, not_identifiable=state.not_identifiable)
+
+
+def few_takes(state: State) -> State:
+    """Where nothing is named, what would be if many takes showed as much: more are to be recorded."""
+    if state.naming.first is not None:
+        return state
+    faint = [
+        item
+        for item in state.assessments
+        if not item.significant_joints and item.as_of_many_takes.significant_joints
+    ]
+    if not faint:
+        return state
+    more = too_few(state.screened.signals, faint, state.question.limits)
+    names = [item.effect for item in faint]
+    sentence = f"{_listed(names)} may be there; these takes are too few to tell."
+    return state.because("few_takes", names, sentence, not_identifiable=(*state.not_identifiable, *more))
 
 
 def lookalikes(state: State) -> State:
@@ -507,6 +524,7 @@ RULES = (
     *ASSESSING,
     Rule(undecidable_first),
     Rule(lookalikes),
+    Rule(few_takes),
     Rule(look_for_signatures, is_evidence=True),
     Rule(slip_beside_known),
     Rule(level_rivals),

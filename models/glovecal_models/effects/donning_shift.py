@@ -65,7 +65,7 @@ class DonningShift(WearingEffect):
         certainty=Certainty(
             clear=0.04,
             faint=0.01,
-            of_few_takes=0.04,
+            of_few_takes=1.0,
             why="there is one column of wearings, but context columns have many names",
         ),
     )

@@ -7,13 +7,14 @@ its ends outside. Constant and slope are left out: the base has them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from glovecal_models.effects.base.comparison import EffectComparison
 from glovecal_models.effects.base.dynamics import InstantEffect
 from glovecal_models.effects.base.effect import FormSignals
-from glovecal_models.effects.base.facts import About, Weights
+from glovecal_models.effects.base.facts import BETWEEN_TAKES, About, Weights
 from glovecal_models.effects.base.learned_form import OWN
 from glovecal_models.effects.base.relations import RAMPS
 from glovecal_models.effects.base.signals import Settings, Signals, on_lanes
@@ -33,7 +34,9 @@ class Nonlinearity(InstantEffect):
         shows_in=("angle",),
         shown_by=RAMPS,
     )
-    comparison = EffectComparison("circularly shifted", is_in_every_glove=True)
+    comparison = EffectComparison(
+        "circularly shifted", certainty=replace(BETWEEN_TAKES, of_few_takes=1.0, why="every sensor bends")
+    )
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if not takes:

@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.text import diagnosis_sentences
 from glovecal_models.effects.base.assessment import Assessment, JointErrors
 from glovecal_models.effects.base.facts import BETWEEN_TAKES
+from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+
+LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 
 BLOCKS_OF_A_TAKE = 4
 
@@ -46,3 +54,16 @@ def test_a_column_that_goes_along_with_few_takes_is_chance_more_often():
     alone = np.zeros((6, BLOCKS_OF_A_TAKE))
     alone[2] = 0.9
     assert not assessed(6, alone, between[0]).significant_joints
+
+
+def test_what_few_takes_show_faintly_asks_for_more_takes():
+    plan = SessionPlan(seed=4, wearings=2, takes_per_wearing=3, take_s=20.0)
+    takes = record_session(plan, [Cause("hysteresis", "single_play", 0.6, ("I_PIP",))]).takes
+    found = diagnose(takes, LAYOUT)
+    assert found.named is None
+    assert (
+        "Not identifiable: hysteresis, lag. Reason: 6 takes are too few to tell what may be saved from chance:"
+        " record 6 more takes." in diagnosis_sentences(found)
+    )
+    assert found.next_take is not None
+    assert found.next_take.separates == ("hysteresis", "lag", "chance")

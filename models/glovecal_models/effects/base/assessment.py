@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -185,7 +185,12 @@ class Assessment:
     @cached_property
     def _has_few_takes(self) -> bool:
         takes = np.unique(np.concatenate([item.take for item in self.errors])) if self.errors else ()
-        return len(takes) < self.limits.few_takes
+        return self.certainty.of_few_takes < 1.0 and len(takes) < self.limits.few_takes
+
+    @property
+    def as_of_many_takes(self) -> Assessment:
+        """The same, judged as where there are many takes."""
+        return replace(self, certainty=replace(self.certainty, of_few_takes=1.0))
 
     @property
     def saved_square(self) -> float:

@@ -69,9 +69,7 @@ class EffectComparison:
     is_joint_by_joint: bool = False
     """Whether each joint has inputs of its own: signals that the joint's base reads already are left out."""
     certainty: Certainty = BETWEEN_TAKES
-    """Asked for where the effect changes between takes."""
-    is_in_every_glove: bool = False
-    """Whether it is true of every glove where it is asked for: few takes are enough to name it."""
+    """Asked for where the effect changes between takes; of few takes of any effect."""
 
     @property
     def changes_between_takes(self) -> bool:

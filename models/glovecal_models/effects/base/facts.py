@@ -102,14 +102,15 @@ class Shape:
 
 @dataclass(frozen=True)
 class Certainty:
-    """How small the p value of an effect that changes between takes must be before it is named."""
+    """How small the p value of an effect that changes between takes must be before it is named, and whether
+    more is asked of few takes."""
 
     clear: float
     """Where the effect saves a large share of the error."""
     faint: float
     """Where it saves less."""
     of_few_takes: float
-    """Where there are few takes, whatever it saves."""
+    """Where there are few takes, whatever it saves. 1: as where there are many, also within takes."""
     why: str
     """What these limits rest on."""
 
