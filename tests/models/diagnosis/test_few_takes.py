@@ -61,9 +61,7 @@ def test_what_few_takes_show_faintly_asks_for_more_takes():
     takes = record_session(plan, [Cause("hysteresis", "single_play", 0.6, ("I_PIP",))]).takes
     found = diagnose(takes, LAYOUT)
     assert found.named is None
-    assert (
-        "Not identifiable: hysteresis, lag. Reason: 6 takes are too few to tell what may be saved from chance:"
-        " record 6 more takes." in diagnosis_sentences(found)
-    )
+    reason = "6 takes are too few to tell what may be saved from chance: record 6 more takes"
+    assert f"Not identifiable: hysteresis, lag. Reason: {reason}." in diagnosis_sentences(found)
     assert found.next_take is not None
     assert found.next_take.separates == ("hysteresis", "lag", "chance")
