@@ -22,7 +22,7 @@ from glovecal_models.calibration.offline import OfflinePredictor
 from glovecal_models.calibration.predictor import GloveAngles, GlovePredictor
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
-from glovecal_models.comparison.delay_curve import DELAYS_MS, draw_delay_curves
+from glovecal_models.comparison.delay_answer import DELAYS_MS, draw_delay_curves
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
 from glovecal_models.presentation.document import Chart

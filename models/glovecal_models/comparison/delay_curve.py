@@ -1,34 +1,34 @@
-"""What a delay would buy: the error of angles that wait for the frames after them, from live to offline."""
+"""The error of angles that wait for the frames after them, from live to offline."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.offline import OfflinePredictor
-from glovecal_models.comparison.residuals import Residuals
-from glovecal_models.presentation.document import answer
-from glovecal_models.presentation.drawing import QUIET, legend_above
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-DELAYS_MS = (0, 50, 100, 200)
-COLOURS = ("#1d6cab", "#c2453d", "#3f9c6b", "#a8790f", "#8d5fa8", "#17a2a8", "#6b6b6b")
+from glovecal_models.comparison.delay_answer import DELAYS_MS, DelayedError
+from glovecal_models.comparison.residuals import Residuals, residuals
+from glovecal_models.takes.take import Take
 
 
-@answer
-class DelayedError:
-    """Of angles that are estimated with the frames up to a delay after them."""
+class LiveBesideOffline(NamedTuple):
+    """What angles that are estimated offline are held against."""
 
-    delay_ms: int
-    rmse_deg: float
+    live: Residuals
+    delayed: tuple[DelayedError, ...]
 
 
-def delay_errors(model: CalibrationModel, found: Residuals) -> tuple[DelayedError, ...]:
+def live_beside_offline(
+    model: CalibrationModel, takes: Sequence[Take], offline: Residuals
+) -> LiveBesideOffline:
+    """Of the same ``takes`` as ``offline``. Raises as ``residuals`` does."""
+    return LiveBesideOffline(residuals(model, takes), _delayed_errors(model, offline))
+
+
+def _delayed_errors(model: CalibrationModel, found: Residuals) -> tuple[DelayedError, ...]:
     """Of the takes of ``found``, all rotations together, for each of ``DELAYS_MS``."""
     predictor, squares = OfflinePredictor(model), [np.empty(0) for _ in DELAYS_MS]
     for item in found.takes:
@@ -44,16 +44,3 @@ def delay_errors(model: CalibrationModel, found: Residuals) -> tuple[DelayedErro
         DelayedError(delay, float(np.sqrt(square.mean())))
         for delay, square in zip(DELAYS_MS, squares, strict=True)
     )
-
-
-def draw_delay_curves(axes: Axes, curves: Mapping[str, Sequence[float]], label: str) -> None:
-    """Each curve by its name: live, each of ``DELAYS_MS``, offline."""
-    names = ["live", *(f"{delay} ms" for delay in DELAYS_MS), "offline"]
-    for colour, (name, values) in zip(COLOURS, curves.items(), strict=False):
-        axes.plot(range(len(names)), values, "o-", color=colour, label=name)
-    axes.set_xticks(range(len(names)), names)
-    axes.grid(axis="y", color=QUIET, alpha=0.4, linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.set(xlabel="delay of a pose", ylabel=label, ylim=(0, None))
-    if len(curves) > 1:
-        legend_above(axes)
