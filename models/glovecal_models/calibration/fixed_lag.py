@@ -77,8 +77,8 @@ class FixedLagSmoother:
         self.frames = 0
         """That were added; their numbers begin at 0."""
         self._joints = joints
-        self._first = 0
-        """Number of the frame in row 0."""
+        self._first = self._needed = 0
+        """Numbers of the frame in row 0, and of the first that is still asked for."""
         self._filter: MotionFilter | None = None
         self._last_s = 0.0
         self._seen = np.zeros(joints, np.int64)
@@ -169,10 +169,7 @@ class FixedLagSmoother:
 
     def forget(self, before: int) -> None:
         """Frames with a smaller number are asked for no more."""
-        kept = slice(before - self._first, self.frames - self._first)
-        for array in self._rows.values():
-            array[: kept.stop - kept.start] = array[kept].copy()
-        self._first = before
+        self._needed = before
 
     @property
     def _is_shared(self) -> bool:
@@ -180,11 +177,15 @@ class FixedLagSmoother:
         return len(self._count) < self._joints
 
     def _row_of_next(self) -> int:
-        row = self.frames - self._first
-        if row == len(self._rows["count"]):
+        room = len(self._rows["count"])
+        if self.frames - self._first == room:
+            kept = slice(self._needed - self._first, room)
             for name, array in self._rows.items():
-                self._rows[name] = np.concatenate([array, np.empty_like(array)])
-        return row
+                if kept.start < room // 2:
+                    array = self._rows[name] = np.concatenate([array, np.empty_like(array)])
+                array[: room - kept.start] = array[kept].copy()
+            self._first = self._needed
+        return self.frames - self._first
 
     def _part_joints(self) -> None:
         """From now on each joint has a covariance of its own."""

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pygltflib
 import pytest
 from playwright.sync_api import expect
@@ -119,6 +120,38 @@ def test_a_robots_joints_are_written_in_place_of_the_persons(opened: Open, take:
     rows = list(csv.DictReader((tmp_path / "robot.csv").read_text().splitlines()))
     bent = [float(row["r.rh_FFJ2"]) for row in rows]
     assert bent[-1] - bent[0] > 40, "the index finger's middle joint bends from 0 to 60 degrees"
+    assert seen.complaints == []
+
+
+def test_a_models_angles_are_written_with_both_directions_of_time_where_that_is_ticked(
+    opened: Open, address: str, trained: str, tmp_path: Path
+) -> None:
+    with RestClient(address) as client:
+        take = client.get(f"/models/{trained}")["facts"]["takes"][0]
+    seen = opened(f"take?id={take}")
+    page = seen.page
+    page.get_by_text("Export for animation tools and analysis").click()
+    page.get_by_role("combobox", name="Format").click()
+    page.get_by_role("option", name="CSV (.csv)").click()
+    both_ways = page.get_by_role("checkbox", name="The model's angles with both directions of time")
+    expect(both_ways).not_to_be_checked()
+    angles = {}
+    for name in ("live", "offline"):
+        if name == "offline":
+            both_ways.click()
+            expect(both_ways).to_be_checked()
+        with page.expect_download(timeout=PATIENCE_MS) as saved:
+            page.get_by_role("button", name="Export the motion").click()
+        saved.value.save_as(tmp_path / f"{name}.csv")
+        rows = list(csv.DictReader((tmp_path / f"{name}.csv").read_text().splitlines()))
+        columns = [column for column in rows[0] if column.startswith("r.")]
+        angles[name] = np.array([[float(row[column] or "nan") for column in columns] for row in rows])
+    difference = angles["offline"] - angles["live"]
+    assert 0.01 < np.nanmax(np.abs(difference)) < 30.0
+    # A smooth motion jumps less from frame to frame.
+    jumps = {name: float(np.nanmean(np.abs(np.diff(each, n=2, axis=0)))) for name, each in angles.items()}
+    assert jumps["offline"] < 0.8 * jumps["live"]
+    assert serious(page) == []
     assert seen.complaints == []
 
 
