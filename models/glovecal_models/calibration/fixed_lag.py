@@ -46,8 +46,10 @@ def delayed(
 ) -> list[SmoothedMotion]:
     """``angles`` (N, L) as of ``smoothed``, once for each of the ``delays_s``: each frame by those up to so
     many seconds after it, by all where that is infinite."""
-    found = [smoothed(time_s, angles, known) if np.isinf(delay) else unsmoothed(angles) for delay in delays_s]
-    finite = [(delay, motion) for delay, motion in zip(delays_s, found, strict=True) if np.isfinite(delay)]
+    motions = [
+        smoothed(time_s, angles, known) if np.isinf(delay) else unsmoothed(angles) for delay in delays_s
+    ]
+    finite = [(delay, motion) for delay, motion in zip(delays_s, motions, strict=True) if np.isfinite(delay)]
     for run in unbroken(time_s) if finite else ():
         smoother, times = FixedLagSmoother(angles.shape[1]), time_s[run]
         ends = [last_seen(times, delay) for delay, _ in finite]
@@ -62,7 +64,7 @@ def delayed(
                 if len(numbers):
                     motion.put(run.start + numbers, smoother.estimates(numbers, end[numbers]))
             smoother.forget(min(int(np.searchsorted(end, stop)) for end in ends))
-    return found
+    return motions
 
 
 def last_seen(time_s: np.ndarray, delay_s: float) -> np.ndarray:

@@ -27,7 +27,7 @@ from glovecal_models.calibration.training_settings import (
     trained_rotations,
 )
 from glovecal_models.comparison.answer import Comparison, PoseErrors, RotationErrors
-from glovecal_models.comparison.delay_curve import LiveBesideOffline, live_beside_offline
+from glovecal_models.comparison.delay_curve import LiveAndDelayed, live_and_delayed
 from glovecal_models.comparison.fingertips import fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
@@ -60,20 +60,20 @@ def compare(
     ``offline``: of angles estimated with both directions of time, beside live and delayed ones;
     ``dimensions`` of the subject's hand, for the errors of fingertips.
     """
-    found = residuals(model, takes, offline=offline)
-    beside = live_beside_offline(model, takes, found) if offline else None
-    return summed_up(found, beside=beside, dimensions=dimensions)
+    predicted = residuals(model, takes, offline=offline)
+    causal = live_and_delayed(model, takes, predicted) if offline else None
+    return summed_up(predicted, causal=causal, dimensions=dimensions)
 
 
 def summed_up(
     found: Residuals,
     noise: Mapping[str, RotationNoise] | None = None,
     *,
-    beside: LiveBesideOffline | None = None,
+    causal: LiveAndDelayed | None = None,
     dimensions: HandDimensions | None = None,
 ) -> Comparison:
     """Residuals as numbers: over all, each rotation, each pose, fingertips. ``noise`` spares its time;
-    ``beside``: live and delayed angles where ``found`` are offline."""
+    ``causal``: live and delayed angles where ``found`` are offline."""
     noise = rotation_noise(found) if noise is None else noise
     error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
     measured = found.measured_rotations
@@ -96,8 +96,8 @@ def summed_up(
         seen_wearings=_wearings_where(found, is_seen=True),
         excluded=found.excluded,
         camera_ranges=covered_ranges([item.take for item in found.takes], measured),
-        live=None if beside is None else _of_all(beside.live),
-        delayed=() if beside is None else beside.delayed,
+        live=None if causal is None else _of_all(causal.live),
+        delayed=() if causal is None else causal.delayed,
     )
 
 

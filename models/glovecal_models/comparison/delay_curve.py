@@ -14,24 +14,22 @@ from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.takes.take import Take
 
 
-class LiveBesideOffline(NamedTuple):
+class LiveAndDelayed(NamedTuple):
     """What angles that are estimated offline are held against."""
 
     live: Residuals
     delayed: tuple[DelayedError, ...]
 
 
-def live_beside_offline(
-    model: CalibrationModel, takes: Sequence[Take], offline: Residuals
-) -> LiveBesideOffline:
+def live_and_delayed(model: CalibrationModel, takes: Sequence[Take], offline: Residuals) -> LiveAndDelayed:
     """Of the same ``takes`` as ``offline``. Raises as ``residuals`` does."""
-    return LiveBesideOffline(residuals(model, takes), _delayed_errors(model, offline))
+    return LiveAndDelayed(residuals(model, takes), _delayed_errors(model, offline))
 
 
-def _delayed_errors(model: CalibrationModel, found: Residuals) -> tuple[DelayedError, ...]:
-    """Of the takes of ``found``, all rotations together, for each of ``DELAYS_MS``."""
+def _delayed_errors(model: CalibrationModel, offline: Residuals) -> tuple[DelayedError, ...]:
+    """Of the takes of ``offline``, all rotations together, for each of ``DELAYS_MS``."""
     predictor, squares = OfflinePredictor(model), [np.empty(0) for _ in DELAYS_MS]
-    for item in found.takes:
+    for item in offline.takes:
         take = item.take
         index = [take.sensors.index(name) for name in model.layout.sensors]
         each = predictor.predict_delayed(

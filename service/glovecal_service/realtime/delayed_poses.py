@@ -46,6 +46,10 @@ class DelayedPoses:
         """With (1, R), degrees squared: what its live claim has for parts that are smoothed."""
         self._newest: LiveFrame | None = None
 
+    def __len__(self) -> int:
+        """Poses that wait."""
+        return len(self._waiting)
+
     def add(self, live: LiveFrame, effects: Effects | None) -> tuple[list[LiveFrame], GloveAngles | None]:
         """The next frame, and what its model's ``effects`` did; frames whose poses are due, with their
         angles, None where there are none."""

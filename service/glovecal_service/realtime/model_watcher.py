@@ -427,8 +427,8 @@ class ModelWatcher:
         if not_stored := self._not_stored.get(glove):
             serving = replace(serving, sentence="; ".join(filter(None, [serving.sentence, not_stored])))
         said = self._metas.of(glove)
-        worn = GloveContext.of(said, serving.wearing, serving.latency, serving.delay_ms)
-        self._worn.put(glove, worn)
+        context = GloveContext.of(said, serving.wearing, serving.latency, serving.delay_ms)
+        self._worn.put(glove, context)
         self._serve(glove, serving)
         self._gloves.add(glove)
         self._to_choose.discard(glove)

@@ -206,33 +206,37 @@ class PoseLoop:
         size = np.maximum(np.abs(angles.mean), np.abs(angles.sd))
         usable: np.ndarray = np.logical_and.reduce(size <= LARGEST_DEG, axis=1)  # NaN is not
         for row in () if usable.all() else np.flatnonzero(~usable).tolist():
-            lane, frame, _ = opened[row]
-            lane.refusals.add(_not_predictable(frame, model, "an angle is absurd or not finite"))
+            glove, frame, _ = opened[row]
+            glove.refusals.add(_not_predictable(frame, model, "an angle is absurd or not finite"))
         return usable
 
-    def _follow_delay(self, lane: GlovePipeline, model: ServedModel | None, delay_ns: int) -> None:
+    def _follow_delay(self, glove: GlovePipeline, model: ServedModel | None, delay_ns: int) -> None:
         """Have the glove's poses wait as long as somebody chose; those that wait otherwise go out."""
-        waiting = lane.delayed
+        waiting = glove.delayed
         if waiting is None or waiting.model is not model or waiting.delay_ns != delay_ns:
             if waiting is not None:
-                self._send_due(lane, waiting, *waiting.rest())
-            lane.delayed = None if model is None or not delay_ns else DelayedPoses(model, delay_ns)
+                self._send_due(glove, waiting, *waiting.rest())
+            glove.delayed = None if model is None or not delay_ns else DelayedPoses(model, delay_ns)
 
     def _delay(
-        self, lane: GlovePipeline, delayed: DelayedPoses, live: LiveFrame, effects: Effects | None
+        self, glove: GlovePipeline, delayed: DelayedPoses, live: LiveFrame, effects: Effects | None
     ) -> None:
-        record = lane.record
+        record = glove.record
         if record is not None and record.is_of(live.frame):
             record.served(live.angles)  # its terms are those of a frame by itself
-            lane.record = None
-        self._send_due(lane, delayed, *delayed.add(live, effects))
+            glove.record = None
+        self._send_due(glove, delayed, *delayed.add(live, effects))
 
     def _send_due(
-        self, lane: GlovePipeline, delayed: DelayedPoses, due: Sequence[LiveFrame], angles: GloveAngles | None
+        self,
+        glove: GlovePipeline,
+        delayed: DelayedPoses,
+        due: Sequence[LiveFrame],
+        angles: GloveAngles | None,
     ) -> None:
         if angles is None:
             return
-        opened = [(lane, one.frame, one.received_ns) for one in due]
+        opened = [(glove, one.frame, one.received_ns) for one in due]
         usable = self._usable(delayed.model, opened, angles)
         for row in np.flatnonzero(usable).tolist():
             self._send(delayed.model, opened[row : row + 1], angles.row(row), [due[row].flags])
@@ -315,13 +319,13 @@ class PoseLoop:
 
     def _repeat_stale(self, lane: GlovePipeline, now: int) -> None:
         """Half a second after the last good frame, and once a second from then on: the last pose, marked."""
-        worn = self._worn.of(lane.glove)
-        if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS + worn.delay_ns:
+        if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS or lane.delayed:
             return
         if now - lane.stale_published_ns < STALE_AGAIN_NS:
             return
         lane.stale_published_ns = now
-        pose, age_us = decode_pose(lane.last_pose), _age_us(lane.last_pose_received_ns - worn.latency_ns)
+        late_ns = self._worn.of(lane.glove).latency_ns
+        pose, age_us = decode_pose(lane.last_pose), _age_us(lane.last_pose_received_ns - late_ns)
         flags = pose.flags | int(PoseFlag.STALE)
         stale = replace(pose, flags=flags, age_us=age_us, skipped=lane.skipped_in_run)
         self._publish(lane.glove, encode_pose(stale))
