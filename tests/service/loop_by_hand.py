@@ -94,7 +94,7 @@ def served_in_turns(
             (lanes.setdefault(glove, GlovePipeline(GloveKeys("lab", glove))), frame, 0)
             for glove, frame in turn
         ]
-        angles, _ = corrected(served, opened, readings, served.predictor.predict(readings), worn)
+        angles, *_ = corrected(served, opened, readings, served.predictor.predict(readings), worn)
         for row, (glove, _) in enumerate(turn):
             one = GloveAngles(*(getattr(angles, name)[row : row + 1] for name in _ANGLES))
             found.setdefault(glove, []).append(one)

@@ -24,7 +24,7 @@ from realtime_support import (
     store_model,
 )
 
-from glovecal_client.errors import NoAnswer
+from glovecal_client.errors import NoAnswer, ServiceError
 from glovecal_client.keys import GloveKeys, all_services
 from glovecal_client.pose_subscriber import PoseSubscriber
 from glovecal_client.session import ask_json, open_client
@@ -502,3 +502,43 @@ def test_junk_on_many_names_keeps_no_new_glove_out(
 
 def places(session: zenoh.Session, settings: Settings) -> dict:
     return service_status(session, settings)["places"]
+
+
+def test_a_glove_with_a_delay_says_so_and_its_poses_wait_for_later_frames(
+    session: zenoh.Session, settings: Settings, store: Store
+) -> None:
+    model_id = store_model(store, "lena", degrees_per_count=0.5)
+    glove = WireGlove(session, settings, "g-late", subject="lena")
+    with in_process_client(settings) as rest:
+        assert rest.put("/gloves/g-late/delay", {"delay_ms": 100})["delay_ms"] == 100
+        with pytest.raises(ServiceError, match="delay_ms"):
+            rest.put("/gloves/g-late/delay", {"delay_ms": 501})
+    glove.say_meta()
+    meta = eventually(lambda: served(session, glove, model_id), "the glove is served")
+    assert meta["delay_ms"] == 100
+    heard: list[tuple[int, Pose]] = []
+
+    def hear(sample: zenoh.Sample) -> None:
+        heard.append((time.monotonic_ns(), decode_pose(sample.payload.to_bytes())))
+
+    subscriber = session.declare_subscriber(glove.keys.pose, zenoh.handlers.Callback(hear, indirect=False))
+    times = {}
+    for number in range(60):
+        frame = glove.frame((120.0 + number, 130.0, 140.0))
+        times[frame.sequence] = frame.monotonic_ns
+        glove.send_bytes(encode_frame(frame))
+        glove.sequence += 1
+        time.sleep(0.005)
+    eventually(lambda: any(pose.stale for _, pose in list(heard)), "the last pose, marked as stale")
+    subscriber.undeclare()
+    poses = [(at, pose) for at, pose in heard if not pose.stale]
+    assert [pose.sequence for _, pose in poses] == list(range(60))
+    for at, pose in poses:
+        assert pose.monotonic_ns == times[pose.sequence]
+        assert at - pose.monotonic_ns >= 100_000_000
+    assert max(pose.age_us for _, pose in poses) >= 100_000
+    books = eventually(lambda: balanced(session, settings, glove), "the books")
+    assert books["predicted"] == 60
+    with in_process_client(settings) as rest:
+        rest.put("/gloves/g-late/delay", {"delay_ms": 0})
+    eventually(lambda: ask_meta(session, glove).get("delay_ms") == 0, "live again")

@@ -42,6 +42,7 @@ VERBS = (
     "paper",
     "study",
     "study active",
+    "study offline",
     "fresh",
     "containers",
     "sbom",
@@ -152,6 +153,18 @@ def test_study_of_active_sampling_compares_two_ways(smoke) -> None:
     said = smoke["study active"].result()
     errors = [said.number(rf"\| {way} \| \d+ \| \d+ \| ([\d.]+) ") for way in ("any step", "active")]
     assert all(0 < error < 90 for error in errors)
+
+
+def test_study_of_recordings_tells_what_a_delay_buys(smoke) -> None:
+    said = smoke["study offline"].result()
+    live, offline = (
+        said.number(rf"noise alone \| 1 \|{skipped} ([\d.]+) ") for skipped in ("", r" [\d.]+ \|")
+    )
+    assert 0 < offline < live < 5
+    # In the row of the curve live comes first, then 0, 50, 100 and 200 ms.
+    curve = r"noise alone \|(?: [\d.]+ \|){3} ([\d.]+) (?:\| [\d.]+ ){2}\| [\d.]+ to [\d.]+ %"
+    at_100_ms = said.number(curve)
+    assert offline <= at_100_ms < live
 
 
 def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> None:

@@ -1,4 +1,4 @@
-"""A whole take's angles, estimated with what came after each frame too.
+"""A take's angles, estimated with what came after each frame too: all of it, or of a stated delay.
 
 Live poses are causal; a recording need not be. What the model says of each frame, its effects with their own
 memory included, is the measurement, and the motion is smoothed in both directions of time. A lag's correction
@@ -18,7 +18,9 @@ import numpy as np
 from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.correction_parts import CorrectionPart, CorrectionParts
 from glovecal_models.calibration.effect_correction import usable_correction
-from glovecal_models.calibration.motion_smoother import SmoothedMotion, smoothed
+from glovecal_models.calibration.fixed_lag import delayed
+from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.motion_smoother import SmoothedMotion
 from glovecal_models.calibration.predictor import LEAST_VARIANCE, GloveAngles, GlovePredictor
 from glovecal_models.effects.base.effect import CorrectionEffect, Late
 
@@ -50,6 +52,10 @@ UNLED = Lead()
 class OfflinePredictor(GlovePredictor):
     """Predicts whole takes with both directions of time; single frames as a ``GlovePredictor``."""
 
+    def __init__(self, model: CalibrationModel) -> None:
+        super().__init__(model)
+        self.smoothing = Smoothing(self, model)
+
     def predict_take(
         self, time_s: np.ndarray, readings: np.ndarray, context: Mapping[str, np.ndarray], wearing: str
     ) -> GloveAngles:
@@ -57,35 +63,63 @@ class OfflinePredictor(GlovePredictor):
 
         Arguments and errors are those of ``GlovePredictor.predict_take``.
         """
+        return self.predict_delayed(time_s, readings, context, wearing, [np.inf])[0]
+
+    def predict_delayed(
+        self,
+        time_s: np.ndarray,
+        readings: np.ndarray,
+        context: Mapping[str, np.ndarray],
+        wearing: str,
+        delays_s: Sequence[float],
+    ) -> list[GloveAngles]:
+        """As ``predict_take``, once for each of the ``delays_s``: each frame is estimated from those up to so
+        many seconds after it, 0 or more; from all of them where that is infinite."""
         base = self.predict(readings)
         if not len(base.mean):
-            return base
-        parts, leads = CorrectionParts(*base.mean.shape), leads_of(self._model.effects)
+            return [base] * len(delays_s)
+        parts = CorrectionParts(*base.mean.shape)
         found = self.stream().of_take(time_s, base.mean, readings, context, wearing, parts)
         live = self.corrected(base, found.degrees, inflation=found.inflation)
-        names = self.rotations
-        led = parts_led(self._model.effects, leads, names)
-        late = late_angles(live.mean, found.degrees, parts.found, led)
-        motion = smoothed(time_s, late.degrees, late.known)
-        each = [leads.get(name, UNLED) for name in names]
-        mean, spread = led_angles(motion, each)
+        late = self.smoothing.late(live, found.degrees, parts.found)
+        motions = delayed(time_s, late.degrees, late.known, delays_s)
+        return [self.smoothing.angles(live, late.claimed, motion) for motion in motions]
+
+
+class Smoothing:
+    """What of a model's live angles is smoothed, and the angles of what was."""
+
+    def __init__(self, predictor: GlovePredictor, model: CalibrationModel) -> None:
+        names, leads = predictor.rotations, leads_of(model.effects)
+        self._rules = predictor.rules
+        self._leads = [leads.get(name, UNLED) for name in names]
+        self._led = parts_led(model.effects, leads, names)
+        self._noise = np.array([item.regressor.noise_variance for item in model.rotations])
+        # Of a measurement, at most what takes that were left out show: regressors learn it from samples that
+        # are spread evenly over postures, and claim too much of it.
+        errors = [item.held_out_rmse_deg for item in model.rotations]
+        self._left_out = np.minimum(self._noise, [np.inf if each is None else each**2 for each in errors])
+        self._is_led = np.array([name in leads for name in names])
+        self._led_variance = np.array([lead.variance for lead in self._leads])
+
+    def late(self, live: GloveAngles, correction: np.ndarray, parts: Sequence[CorrectionPart]) -> LateAngles:
+        """Of ``live`` angles with the effects' ``correction`` (N, R) and its ``parts``."""
+        return late_angles(live.mean, correction, parts, self._led)
+
+    def angles(self, live: GloveAngles, claimed: np.ndarray, motion: SmoothedMotion) -> GloveAngles:
+        """Of the smoothed ``motion`` of late angles that ``claimed`` (N, R); where nothing was measured, the
+        ``live`` ones."""
+        mean, spread = led_angles(motion, self._leads)
         # Instead of single frames' noise, which a live claim holds, ``spread`` is what is left of it.
-        learned = np.array([name in leads for name in names])
-        unsmoothed = np.where(learned, [lead.variance for lead in each], self._left_out() - motion.noise)
-        other = live.sd**2 - late.claimed - self._noise[:, 0]
+        unsmoothed = np.where(self._is_led, self._led_variance, self._left_out - motion.noise)
+        other = live.sd**2 - claimed - self._noise
         variance = np.maximum(other + unsmoothed, LEAST_VARIANCE) + spread
-        for row, sources, weights in self.rules:
+        mean = np.where(motion.is_measured, mean, live.mean)
+        variance = np.where(motion.is_measured, variance, live.sd**2)
+        for row, sources, weights in self._rules:
             mean[:, row] = mean[:, sources] @ weights
             variance[:, row] = variance[:, sources] @ (weights * weights)
         return GloveAngles(mean, np.sqrt(variance), live.flags)
-
-    def _left_out(self) -> np.ndarray:
-        """(R,), degrees squared: noise of a measurement, at most what takes that were left out show.
-
-        Regressors learn it from samples that are spread evenly over postures, and claim too much of it.
-        """
-        errors = [item.held_out_rmse_deg for item in self._model.rotations]
-        return np.minimum(self._noise[:, 0], [np.inf if error is None else error**2 for error in errors])
 
 
 class LateAngles(NamedTuple):

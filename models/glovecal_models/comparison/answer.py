@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from glovecal_models.ceiling.answer import LeftToGain
+from glovecal_models.comparison.delay_answer import DelayedError, draw_delay_curves
 from glovecal_models.comparison.fingertip_answer import ALL, Bar, FingertipErrors, draw_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor, interval_text
 from glovecal_models.presentation.document import (
@@ -28,7 +29,7 @@ from glovecal_models.presentation.document import (
     counted,
     first_of,
 )
-from glovecal_models.presentation.drawing import FLOOR, QUIET, legend_above
+from glovecal_models.presentation.drawing import FLOOR, QUIET, SEVERAL, legend_above
 from glovecal_models.takes.camera_estimates import CoveredRange
 
 if TYPE_CHECKING:
@@ -46,7 +47,6 @@ SCALES = (
 )
 SIDE_BY_SIDE = f"floor: {FLOOR_MEANS}, the smallest of these models; spread: error when predicting the mean."
 EACH_POSE = "Each pose"
-COLOURS = ("#1d6cab", "#3f9c6b", "#8d5fa8", "#c2453d", "#6b6b6b", "#17a2a8", "#a8790f", "#d16ba5")
 MARKERS = "osD^vP*X"
 
 
@@ -145,6 +145,8 @@ class Comparison(OnSeenTakes):
     """Of rotations that a camera measured: angles outside of these ranges were not compared."""
     live: RotationErrors | None = None
     """Overall of live angles, where all else is of angles estimated offline; null: all is of live ones."""
+    delayed: Sequence[DelayedError] = ()
+    """Overall, of angles that wait for the frames after them, beside offline ones."""
     rmse_unseen_wearing_deg: float | None = None
     """Of the takes whose wearing the model has not seen; null: there are none, or unknown."""
     sentences: Sequence[str] = ()
@@ -163,7 +165,8 @@ class Comparison(OnSeenTakes):
             return []
         return [
             f"Estimated offline, with both directions of time: {self.overall.rmse_deg:.2f} degrees, "
-            f"live {self.live.rmse_deg:.2f}."
+            f"live {self.live.rmse_deg:.2f}; with a delay of "
+            f"{', '.join(f'{item.delay_ms} ms {item.rmse_deg:.2f}' for item in self.delayed)}."
         ]
 
     def _of_wearings(self) -> list[str]:
@@ -272,8 +275,24 @@ class Comparison(OnSeenTakes):
         below = [*doubts, *self.excluded_sentences]
         return [
             Section("Error and noise floor", [*_lines(camera), self._chart(), self._table(), *_lines(below)]),
+            Section("What a delay would buy", self._delay_chart()),
             Section("Fingertips", of_tips),
             Section(EACH_POSE, [pose_table(self.poses)] if self.poses else [], is_detail=True),
+        ]
+
+    def _delay_chart(self) -> list[Part]:
+        """From live poses over those of a glove that is served with a delay to offline."""
+        if self.live is None:
+            return []
+        errors = [self.live.rmse_deg, *(item.rmse_deg for item in self.delayed), self.overall.rmse_deg]
+        sentence = (
+            f"{self.live.rmse_deg:.2f} degrees live, {self.overall.rmse_deg:.2f} when all frames are known. "
+            f"To serve a glove with a delay: glovecal glove delay GLOVE 100"
+        )
+        return [
+            Chart(
+                lambda axes: draw_delay_curves(axes, {"": errors}, "error (RMSE), degrees"), 7, 2.8, sentence
+            )
         ]
 
     @property
@@ -391,7 +410,7 @@ class SideBySide(Answer):
             known = [(errors.rmse_deg, at) for at, name in enumerate(rows) if (errors := one.errors_of(name))]
             axes.plot(
                 *zip(*known, strict=True), MARKERS[number % len(MARKERS)],
-                color=COLOURS[number % len(COLOURS)], linestyle="", label=one.name,
+                color=SEVERAL[number % len(SEVERAL)], linestyle="", label=one.name,
             )  # fmt: skip
         axes.set_yticks(range(len(rows)), rows)
         axes.grid(axis="y", color=QUIET, alpha=0.4, linewidth=0.8)

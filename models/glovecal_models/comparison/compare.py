@@ -27,6 +27,7 @@ from glovecal_models.calibration.training_settings import (
     trained_rotations,
 )
 from glovecal_models.comparison.answer import Comparison, PoseErrors, RotationErrors
+from glovecal_models.comparison.delay_curve import LiveAndDelayed, live_and_delayed
 from glovecal_models.comparison.fingertips import fingertip_errors
 from glovecal_models.comparison.floor_estimate import NoiseFloor, joined
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
@@ -56,22 +57,23 @@ def compare(
 ) -> Comparison:
     """Errors of ``model`` on ``takes``. Raises LayoutMismatch, and BadInput when nothing was measured.
 
-    ``offline``: of angles estimated with both directions of time, beside those of live ones; ``dimensions``
-    of the subject's hand, for the errors of fingertips.
+    ``offline``: of angles estimated with both directions of time, beside live and delayed ones;
+    ``dimensions`` of the subject's hand, for the errors of fingertips.
     """
-    live = residuals(model, takes) if offline else None
-    return summed_up(residuals(model, takes, offline=offline), live=live, dimensions=dimensions)
+    predicted = residuals(model, takes, offline=offline)
+    causal = live_and_delayed(model, takes, predicted) if offline else None
+    return summed_up(predicted, causal=causal, dimensions=dimensions)
 
 
 def summed_up(
     found: Residuals,
     noise: Mapping[str, RotationNoise] | None = None,
     *,
-    live: Residuals | None = None,
+    causal: LiveAndDelayed | None = None,
     dimensions: HandDimensions | None = None,
 ) -> Comparison:
     """Residuals as numbers: over all, each rotation, each pose, fingertips. ``noise`` spares its time;
-    ``live`` are those of live angles where ``found`` are offline."""
+    ``causal``: live and delayed angles where ``found`` are offline."""
     noise = rotation_noise(found) if noise is None else noise
     error, spread, reference = (found.stacked(name) for name in ("error", "sd", "measured"))
     measured = found.measured_rotations
@@ -94,7 +96,8 @@ def summed_up(
         seen_wearings=_wearings_where(found, is_seen=True),
         excluded=found.excluded,
         camera_ranges=covered_ranges([item.take for item in found.takes], measured),
-        live=None if live is None else _of_all(live),
+        live=None if causal is None else _of_all(causal.live),
+        delayed=() if causal is None else causal.delayed,
     )
 
 

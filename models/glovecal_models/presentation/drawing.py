@@ -27,6 +27,8 @@ MODEL, MEASURED, FLOOR, QUIET, CONTROL, CARD = (
 """Colours: what the model says, what was measured (and all text), noise floors, what is only there for scale
 or not significant, controls, empty cells."""
 GREY = "#80868c"
+SEVERAL = ("#1d6cab", "#3f9c6b", "#8d5fa8", "#c2453d", "#6b6b6b", "#17a2a8", "#a8790f", "#d16ba5")
+"""Colours of things of one kind, such as models."""
 TICK_LETTERS = 34
 """Of a tick, in one line."""
 HEAT = "Blue with a dot: significant; grey: not."

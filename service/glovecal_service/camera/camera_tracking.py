@@ -342,6 +342,7 @@ class CameraTracking:
             "run_id": f"{self._run_id:016x}",
             "glove_latency_s": None,
             "glove_latency_sd_s": None,
+            "delay_ms": 0,
             "model": None if setup is None else setup.name(self._stage),
             "method": f"colour_glove_{self._stage}",
             "model_simulated": False,

@@ -24,6 +24,7 @@ from glovecal_models.diagnosis.worn_glove import GloveFinding, live_findings
 from glovecal_service.incoming.frame_gate import FrameGate, Refusal, RefusalCount, Refused, Standing
 from glovecal_service.incoming.glove_owners import GloveOwners
 from glovecal_service.incoming.rate_limit import MOST_HZ, RateLimit
+from glovecal_service.realtime.delayed_poses import DelayedPoses
 from glovecal_service.realtime.frame_record import FrameRecord
 from glovecal_service.realtime.lane_effects import LaneEffects
 from glovecal_service.realtime.served_model import ServedModel
@@ -69,6 +70,8 @@ class GlovePipeline:
         self.model_id: str | None = None
         self.effects: LaneEffects | None = None
         """State of its model's effects; None for a model without."""
+        self.delayed: DelayedPoses | None = None
+        """Poses that wait, and how they are estimated; None for a glove without a delay."""
         self.watch: LiveWatch | None = None
         """Its last seconds; None before the first pose."""
         self.record: FrameRecord | None = None

@@ -38,12 +38,18 @@ class GloveContext:
     """Names of a frame's context values, in order."""
     latency_ns: int = 0
     """How long before a frame's time the hand was as it shows; 0 if nobody measured it."""
+    delay_ns: int = 0
+    """How long a pose waits for the frames after it."""
     sensors: tuple[str, ...] = ()
     """Names of a frame's readings, in order; empty while capture has not said them."""
 
     @classmethod
     def of(
-        cls, meta: Mapping[str, Any] | None, wearing: str | None, latency: KnownLatency | None = None
+        cls,
+        meta: Mapping[str, Any] | None,
+        wearing: str | None,
+        latency: KnownLatency | None = None,
+        delay_ms: int = 0,
     ) -> GloveContext:
         """``meta`` as capture said it, ``wearing`` as the store has it (it knows later assignments too)."""
         meta = meta or {}
@@ -52,7 +58,8 @@ class GloveContext:
         latency_ns = 0 if latency is None else round(1e9 * latency.seconds)
         said = meta.get("sensors")
         sensors = tuple(map(str, said)) if isinstance(said, list) else ()
-        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns, sensors)
+        delay_ns = 1_000_000 * delay_ms
+        return cls(str(meta.get("run_id") or ""), wearing or "", context, latency_ns, delay_ns, sensors)
 
     def wearing_of(self, frame: Frame) -> str:
         """A run of which nothing was said yet is a wearing of its own, without a name."""

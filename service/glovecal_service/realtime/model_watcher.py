@@ -81,8 +81,9 @@ def _chosen(store: Store, glove: str, meta: Mapping[str, Any] | None, prepared: 
     run_id = str((meta or {}).get("run_id") or "")
     hand = known_hand((meta or {}).get("hand"))
     serving = Serving(
-        subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency, hand=hand
-    )
+        subject, layout, wearing=record.wearing, run_id=run_id, latency=record.known_latency,
+        delay_ms=record.delay_ms, hand=hand,
+    )  # fmt: skip
     if layout is None:
         return replace(serving, sentence=f"glove {glove} has not said yet which layout it has")
     if subject is None:
@@ -425,7 +426,9 @@ class ModelWatcher:
             serving = self._keep(glove, "the newer one fails here, the log of real time says where")
         if not_stored := self._not_stored.get(glove):
             serving = replace(serving, sentence="; ".join(filter(None, [serving.sentence, not_stored])))
-        self._worn.put(glove, GloveContext.of(self._metas.of(glove), serving.wearing, serving.latency))
+        said = self._metas.of(glove)
+        context = GloveContext.of(said, serving.wearing, serving.latency, serving.delay_ms)
+        self._worn.put(glove, context)
         self._serve(glove, serving)
         self._gloves.add(glove)
         self._to_choose.discard(glove)
@@ -438,7 +441,7 @@ class ModelWatcher:
         latency = None if late_s is None else KnownLatency(late_s, known["glove_latency_sd_s"])
         return Serving(
             known.get("subject"), known.get("layout"), model, sentence, wearing, run_id, latency,
-            known_hand(known.get("hand")), known.get("skeleton"),
+            known.get("delay_ms", 0), known_hand(known.get("hand")), known.get("skeleton"),
         )  # fmt: skip
 
     def _serve(self, glove: str, serving: Serving) -> None:

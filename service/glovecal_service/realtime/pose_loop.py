@@ -39,6 +39,7 @@ from glovecal_models.calibration.servable import LARGEST_DEG
 from glovecal_service.incoming.arrivals import Arrival, Arrivals
 from glovecal_service.incoming.frame_gate import Refusal, Refused
 from glovecal_service.incoming.glove_owners import GloveOwners
+from glovecal_service.realtime.delayed_poses import DelayedPoses, LiveFrame
 from glovecal_service.realtime.frame_record import Effects
 from glovecal_service.realtime.glove_lanes import GlovePipeline, GlovePipelines
 from glovecal_service.realtime.lane_effects import LaneEffects, WornGloves
@@ -154,6 +155,9 @@ class PoseLoop:
     def _serve(self, model: ServedModel, lanes: list[GlovePipeline], limit: int) -> int:
         opened: list[tuple[GlovePipeline, Frame, int]] = []
         for lane in lanes:
+            delay_ns = self._worn.of(lane.glove).delay_ns
+            if delay_ns or lane.delayed is not None:
+                self._follow_delay(lane, model, delay_ns)
             for frame, received_ns in self._open(lane, limit):
                 try:
                     model.check_count(frame.readings)
@@ -181,17 +185,61 @@ class PoseLoop:
             opened = [item for row, item in enumerate(opened) if row not in refused]
             readings = np.delete(readings, list(refused), axis=0)
         angles = model.predictor.predict(readings)
-        angles, effect_flags = corrected(model, opened, readings, angles, self._worn)
+        angles, effect_flags, effects = corrected(model, opened, readings, angles, self._worn)
+        goes = self._usable(model, opened, angles)
+        for row, (lane, frame, received_ns) in enumerate(opened):
+            if lane.delayed is not None and goes[row]:
+                goes[row] = False
+                live = LiveFrame(frame, received_ns, angles.row(row), effect_flags[row])
+                self._delay(lane, lane.delayed, live, effects.get(row))
+        if not goes.all():
+            opened = [item for row, item in enumerate(opened) if goes[row]]
+            effect_flags = [flags for row, flags in enumerate(effect_flags) if goes[row]]
+            angles = GloveAngles(angles.mean[goes], angles.sd[goes], angles.flags[goes])
+        if opened:
+            self._send(model, opened, angles, effect_flags)
+
+    def _usable(
+        self, model: ServedModel, opened: Sequence[tuple[GlovePipeline, Frame, int]], angles: GloveAngles
+    ) -> np.ndarray:
+        """(N,) whether each frame's angles may be sent; those that may not are refused."""
         size = np.maximum(np.abs(angles.mean), np.abs(angles.sd))
         usable: np.ndarray = np.logical_and.reduce(size <= LARGEST_DEG, axis=1)  # NaN is not
-        if not usable.all():
-            for row in np.flatnonzero(~usable).tolist():
-                lane, frame, _ = opened[row]
-                lane.refusals.add(_not_predictable(frame, model, "an angle is absurd or not finite"))
-            opened = [item for row, item in enumerate(opened) if usable[row]]
-            effect_flags = [flags for row, flags in enumerate(effect_flags) if usable[row]]
-            angles = GloveAngles(angles.mean[usable], angles.sd[usable], angles.flags[usable])
-        self._send(model, opened, angles, effect_flags)
+        for row in () if usable.all() else np.flatnonzero(~usable).tolist():
+            glove, frame, _ = opened[row]
+            glove.refusals.add(_not_predictable(frame, model, "an angle is absurd or not finite"))
+        return usable
+
+    def _follow_delay(self, glove: GlovePipeline, model: ServedModel | None, delay_ns: int) -> None:
+        """Have the glove's poses wait as long as somebody chose; those that wait otherwise go out."""
+        waiting = glove.delayed
+        if waiting is None or waiting.model is not model or waiting.delay_ns != delay_ns:
+            if waiting is not None:
+                self._send_due(glove, waiting, *waiting.rest())
+            glove.delayed = None if model is None or not delay_ns else DelayedPoses(model, delay_ns)
+
+    def _delay(
+        self, glove: GlovePipeline, delayed: DelayedPoses, live: LiveFrame, effects: Effects | None
+    ) -> None:
+        record = glove.record
+        if record is not None and record.is_of(live.frame):
+            record.served(live.angles)  # its terms are those of a frame by itself
+            glove.record = None
+        self._send_due(glove, delayed, *delayed.add(live, effects))
+
+    def _send_due(
+        self,
+        glove: GlovePipeline,
+        delayed: DelayedPoses,
+        due: Sequence[LiveFrame],
+        angles: GloveAngles | None,
+    ) -> None:
+        if angles is None:
+            return
+        opened = [(glove, one.frame, one.received_ns) for one in due]
+        usable = self._usable(delayed.model, opened, angles)
+        for row in np.flatnonzero(usable).tolist():
+            self._send(delayed.model, opened[row : row + 1], angles.row(row), [due[row].flags])
 
     def _send(
         self,
@@ -233,6 +281,7 @@ class PoseLoop:
 
     def _serve_uncalibrated(self, lane: GlovePipeline) -> None:
         lane.effects = None
+        self._follow_delay(lane, None, 0)
         late_ns = self._worn.of(lane.glove).latency_ns
         for frame, received_ns in self._open(lane, len(lane)):
             flags = int(PoseFlag.UNCALIBRATED) | _simulated(frame)
@@ -261,6 +310,8 @@ class PoseLoop:
             return
         self._looked_for_stale_ns = now
         for lane in self.gloves.all():
+            if lane.delayed is not None:
+                self._send_due(lane, lane.delayed, *lane.delayed.rest(now))
             self._repeat_stale(lane, now)
         if now - self._collected_ns >= _COLLECT_EVERY_NS:
             self._collected_ns = now
@@ -268,7 +319,7 @@ class PoseLoop:
 
     def _repeat_stale(self, lane: GlovePipeline, now: int) -> None:
         """Half a second after the last good frame, and once a second from then on: the last pose, marked."""
-        if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS:
+        if lane.last_pose is None or now - lane.last_pose_received_ns < STALE_AFTER_NS or lane.delayed:
             return
         if now - lane.stale_published_ns < STALE_AGAIN_NS:
             return
@@ -303,19 +354,22 @@ def corrected(
     readings: np.ndarray,
     angles: GloveAngles,
     worn: WornGloves,
-) -> tuple[GloveAngles, list[int]]:
-    """``angles`` of the ``opened`` frames with the effects, and flags for each pose.
+) -> tuple[GloveAngles, list[int], dict[int, Effects]]:
+    """``angles`` of the ``opened`` frames with the effects, flags for each pose, and by their rows what the
+    effects did with frames of which somebody has to know.
 
     ``readings`` (N, S) are theirs. Frames of a glove must be in order; those of several may be mixed.
     """
     flags = [0] * len(opened)
-    recorded = [row for row, (lane, _, _) in enumerate(opened) if lane.record is not None]
+    recorded = [
+        row for row, (lane, _, _) in enumerate(opened) if lane.record is not None or lane.delayed is not None
+    ]
     if not model.predictor.has_effects:
         for lane, _, _ in opened:
             lane.effects = None
         for row in recorded:
             _write_down(model, opened[row], readings[row], angles.row(row), None)
-        return angles, flags
+        return angles, flags, {}
     turn = _Turn(angles.mean, frozenset(recorded))
     # What is no number gets no pose, and must not get into a state either.
     for rows in _successive(opened, np.logical_and.reduce(np.isfinite(angles.mean), axis=1)):
@@ -331,7 +385,8 @@ def corrected(
             flags[row] |= _FAULTY_SENSOR
     for row, effects in turn.recorded.items():
         _write_down(model, opened[row], readings[row], angles.row(row), effects)
-    return model.predictor.corrected(angles, turn.correction, turn.undefined, turn.inflation), flags
+    angles = model.predictor.corrected(angles, turn.correction, turn.undefined, turn.inflation)
+    return angles, flags, turn.recorded
 
 
 def _write_down(

@@ -43,6 +43,8 @@ class Serving:
     """The run of the capture daemon that this was decided for."""
     latency: KnownLatency | None = None
     """How late the glove is known to be: the poses' times and ages hold it."""
+    delay_ms: int = 0
+    """How long each pose waits for the frames after it, as somebody chose for the glove."""
     hand: Handedness | None = None
     skeleton: dict[str, Any] | None = None
     """The wearer's hand, ``skeleton_document``; None where nobody said which hand or who wears it."""
@@ -60,6 +62,7 @@ class Serving:
             "run_id": self.run_id,
             "glove_latency_s": None if self.latency is None else self.latency.seconds,
             "glove_latency_sd_s": None if self.latency is None else self.latency.sd_s,
+            "delay_ms": self.delay_ms,
             "model": None if model is None else model.model_id,
             "method": None if model is None else model.method,
             "model_simulated": None if model is None else model.simulated,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import timeit
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
 from glovecal_client.wire.pose import model_bytes
 from glovecal_models.calibration.effect_correction import EffectCorrection
 from glovecal_models.calibration.model import CalibrationModel
+from glovecal_models.calibration.offline import Smoothing
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.servable import WearerFit, check_servable
 from glovecal_service.incoming.frame_gate import Refusal, Refused
@@ -100,6 +101,11 @@ class ServedModel:
             effects=gloves[0].names,
             pace=Pace(frame_s + BESIDES_PREDICTION_S, max(one - frame_s, 0.0)),
         )
+
+    @cached_property
+    def smoothing(self) -> Smoothing:
+        """For gloves that are served with a delay."""
+        return Smoothing(self.predictor, self.model)
 
     def check_count(self, readings: np.ndarray) -> None:
         """Raise Refused for readings (S,) that are not this layout's."""

@@ -22,7 +22,7 @@ from glovecal_service.store.texts import json_text
 WATCHED: Mapping[Table, tuple[str, ...]] = {
     tables.subjects: ("title", "dimensions", "hand"),
     tables.layouts: ("document",),
-    tables.gloves: ("layout", "subject", "wearing", "hand", "latency"),
+    tables.gloves: ("layout", "subject", "wearing", "hand", "latency", "delay_ms"),
     tables.takes: ("name", "subject", "layout", "wearing", "artifact", "facts"),
     tables.models: ("subject", "layout", "method", "parent", "facts", "hand"),
     tables.activations: ("subject", "layout", "model", "kind", "hand"),

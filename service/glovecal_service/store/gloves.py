@@ -22,6 +22,8 @@ from glovecal_service.store.subjects import require_subject
 from glovecal_service.store.texts import check_text
 
 MOST_GLOVES = 256
+MOST_DELAY_MS = 500
+"""After it, more frames change nothing."""
 MOST_META_BYTES = 65_536
 """As much as the router lets through at once."""
 _WEARER = ("layout", "subject", "wearing", "hand")
@@ -61,7 +63,7 @@ class Gloves:
             stored = {} if earlier is None else sound_row(tables.gloves, earlier)
         if changes and earlier is not None:
             _keep_chosen_wearer(changes, earlier)
-        nothing = dict.fromkeys(("layout", "subject", "wearing", "assigned_at", "latency"))
+        nothing = dict.fromkeys(("layout", "subject", "wearing", "assigned_at", "latency")) | {"delay_ms": 0}
         return _record({**nothing, **_unseen(glove, now()), **stored, **changes})
 
     def remove(self, name: str) -> None:
@@ -125,11 +127,21 @@ class Gloves:
         """Keep how late the glove was measured to be, ``latency_s`` and ``sd_s`` in seconds and what else is
         to be known of it; None forgets it. The glove need not have been seen yet. Raises BadInput,
         Conflict where ``MOST_GLOVES`` are stored already."""
+        return self._set(glove, {"latency": None if latency is None else dict(latency)})
+
+    def set_delay(self, glove: str, delay_ms: int) -> GloveRecord:
+        """Have live poses wait so long for the frames after them. The glove need not have been seen yet.
+        Raises BadInput, Conflict where ``MOST_GLOVES`` are stored already."""
+        if not 0 <= delay_ms <= MOST_DELAY_MS:
+            raise BadInput(f"delay of glove {glove!r}: {delay_ms} ms; choose 0 to {MOST_DELAY_MS}")
+        return self._set(glove, {"delay_ms": delay_ms})
+
+    def _set(self, glove: str, values: Mapping[str, Any]) -> GloveRecord:
         check_identifier(glove, "glove")
         with self._database.write() as connection:
             if _find(connection, glove) is None:
                 _add(connection, _unseen(glove, now()))
-            _change(connection, glove, {"latency": None if latency is None else dict(latency)})
+            _change(connection, glove, values)
             tell_change(connection, "glove", glove)
             return _record(sound_row(tables.gloves, _require(connection, glove)))
 

@@ -85,6 +85,8 @@ class GloveRecord:
     """When a user last chose the wearer; None if only the capture daemon said who it is."""
     latency: dict[str, Any] | None = None
     """How late the glove was measured to be: ``latency_s``, ``sd_s``, ``taps`` ...; None if nobody did."""
+    delay_ms: int = 0
+    """How long its live poses wait for the frames after them, as a user chose."""
 
     @property
     def known_latency(self) -> KnownLatency | None:

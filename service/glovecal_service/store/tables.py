@@ -169,6 +169,7 @@ gloves = Table(
     Column("assigned_at", UtcTime),
     Column("assigned_run_id", String(32)),
     Column("latency", Json),
+    Column("delay_ms", Integer, nullable=False, server_default="0"),
 )
 
 takes = Table(

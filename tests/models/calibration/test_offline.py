@@ -18,6 +18,8 @@ from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
 from glovecal_models.improvement.add_effect import add_effect
 from glovecal_models.layout import Layout
+from glovecal_models.presentation.document import Chart
+from glovecal_models.presentation.drawing import svg
 from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import SessionPlan
@@ -170,3 +172,14 @@ def test_a_lag_is_led_back_by_the_smoothed_motion() -> None:
     assert found.live is not None
     assert found.overall.rmse_deg < found.live.rmse_deg == compare(late, [take]).overall.rmse_deg
     assert f"live {found.live.rmse_deg:.2f}" in found.presentation().summary[1].text
+    filtered, *delayed = [item.rmse_deg for item in found.delayed]
+    assert found.live.rmse_deg > 1.1 * delayed[0] > 1.1 * delayed[-1]
+    assert filtered > delayed[0]
+    assert delayed[-1] == pytest.approx(found.overall.rmse_deg, rel=0.03)
+    [section] = [item for item in found.sections if item.heading == "What a delay would buy"]
+    [chart] = section.parts
+    assert isinstance(chart, Chart)
+    assert svg(chart).count("200 ms") == 1
+    assert not [
+        item for item in compare(late, [take]).sections if item.heading == section.heading and item.parts
+    ]

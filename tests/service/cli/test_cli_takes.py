@@ -295,6 +295,16 @@ def test_who_wears_a_glove(run):
     assert run("glove", "wear", "right", "anna", "--nobody").code == 2
 
 
+def test_how_long_a_gloves_poses_wait(run):
+    assert run("glove", "delay", "right", "100").out == "Poses of right come 100 ms late.\n"
+    (seen,) = run("glove", "list", "--json").json["seen"]
+    assert seen["delay_ms"] == 100
+    assert "delay (ms)" in run("glove", "list").out
+    assert run("glove", "delay", "right", "0").out == "right is live.\n"
+    assert run("glove", "delay", "right", "501").code == 2
+    assert run("glove", "remove", "right").code == 0
+
+
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 def test_a_file_written_has_the_rights_of_any_other(anna, tmp_path):
     other = tmp_path / "other"

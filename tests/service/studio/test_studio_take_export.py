@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pygltflib
 import pytest
 from playwright.sync_api import expect
@@ -17,6 +19,11 @@ from characters import write_character, write_fbx_character
 from studio_support import PATIENCE_MS, Open, serious
 
 from glovecal_client.rest import RestClient
+from glovecal_models.calibration.artifact import dump
+from glovecal_models.calibration.training import train
+from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_service.settings import Settings
+from glovecal_service.store import Store
 
 pytestmark = pytest.mark.needs_chromium
 
@@ -31,6 +38,28 @@ def take(address: str, tmp_path_factory: pytest.TempPathFactory) -> str:
         client.post("/subjects", {"name": "wendy", "hand": "right"})
         client.upload_takes(table, subject="wendy")
         return client.get("/takes", {"subject": "wendy"})[0]["id"]
+
+
+@pytest.fixture
+def posed(address: str, settings: Settings, tmp_path: Path) -> Iterator[str]:
+    """The id of a take whose subject has a model and a hand; removed afterwards."""
+    random, time_s = np.random.default_rng(1), np.arange(600) / 60
+    bent = 60 + 25 * np.sin(2 * time_s[:, None] + np.arange(2))
+    columns = np.column_stack([time_s, 2 * bent + random.normal(0, 3, bent.shape), bent])
+    table, names = tmp_path / "moved.csv", ["time_s", "s.I_MCP", "s.I_PIP", "r.I_MCP", "r.I_PIP"]
+    np.savetxt(table, columns, delimiter=",", header=",".join(names), comments="", fmt="%.4f")
+    with Store.open(settings) as store, RestClient(address) as client:
+        client.post("/subjects", {"name": "olaf", "hand": "right"})
+        client.upload_takes(table, subject="olaf")
+        [take] = client.get("/takes", {"subject": "olaf"})
+        layout = store.layouts.get(take["layout"])
+        model = train([store.takes.load(take["id"])], layout, "olaf", TrainingSettings(method="linear"))
+        record = store.models.add(
+            dump(model), subject="olaf", layout=layout.name, method="linear", parent=None, facts={}
+        )
+        store.models.activate(record.id)
+        yield take["id"]
+        client.post("/erasures", {"subject": "olaf"})
 
 
 def test_the_browser_saves_a_take_as_gltf_with_measured_angles(
@@ -119,6 +148,36 @@ def test_a_robots_joints_are_written_in_place_of_the_persons(opened: Open, take:
     rows = list(csv.DictReader((tmp_path / "robot.csv").read_text().splitlines()))
     bent = [float(row["r.rh_FFJ2"]) for row in rows]
     assert bent[-1] - bent[0] > 40, "the index finger's middle joint bends from 0 to 60 degrees"
+    assert seen.complaints == []
+
+
+def test_a_models_angles_are_written_with_both_directions_of_time_where_that_is_ticked(
+    opened: Open, posed: str, tmp_path: Path
+) -> None:
+    seen = opened(f"take?id={posed}")
+    page = seen.page
+    page.get_by_text("Export for animation tools and analysis").click()
+    page.get_by_role("combobox", name="Format").click()
+    page.get_by_role("option", name="CSV (.csv)").click()
+    both_ways = page.get_by_role("checkbox", name="The model's angles with both directions of time")
+    expect(both_ways).not_to_be_checked()
+    angles = {}
+    for name in ("live", "offline"):
+        if name == "offline":
+            both_ways.click()
+            expect(both_ways).to_be_checked()
+        with page.expect_download(timeout=PATIENCE_MS) as saved:
+            page.get_by_role("button", name="Export the motion").click()
+        saved.value.save_as(tmp_path / f"{name}.csv")
+        rows = list(csv.DictReader((tmp_path / f"{name}.csv").read_text().splitlines()))
+        columns = [column for column in rows[0] if column.startswith("r.")]
+        angles[name] = np.array([[float(row[column] or "nan") for column in columns] for row in rows])
+    difference = angles["offline"] - angles["live"]
+    assert 0.01 < np.nanmax(np.abs(difference)) < 30.0
+    # A smooth motion jumps less from frame to frame.
+    jumps = {name: float(np.nanmean(np.abs(np.diff(each, n=2, axis=0)))) for name, each in angles.items()}
+    assert jumps["offline"] < 0.8 * jumps["live"]
+    assert serious(page) == []
     assert seen.complaints == []
 
 

@@ -27,7 +27,7 @@ from glovecal_service.cli.terminal.printing import (
     write_whole,
 )
 from glovecal_service.plain import read
-from glovecal_service.rest.glove.answer import Gloves, LatencyView, LayoutView
+from glovecal_service.rest.glove.answer import MOST_DELAY_MS, Gloves, LatencyView, LayoutView
 
 if TYPE_CHECKING:
     from glovecal_client.rest import RestClient
@@ -54,7 +54,10 @@ def list_gloves(as_json: AsJson = False) -> None:
     )
     out.print()
     print_table(
-        [{**vars(item), "latency": _latency(item.latency)} for item in found.seen],
+        [
+            {**vars(item), "latency": _latency(item.latency), "delay": item.delay_ms or ""}
+            for item in found.seen
+        ],
         {
             "name": "glove",
             "layout": "layout",
@@ -62,6 +65,7 @@ def list_gloves(as_json: AsJson = False) -> None:
             "wearing": "wearing",
             "simulated": "simulated",
             "latency": "latency (ms)",
+            "delay": "delay (ms)",
             "last_seen_at": "last seen",
         },
         empty="No glove seen yet. Start one: glovecal capture --device cyberglove:PORT --glove NAME",
@@ -127,6 +131,19 @@ def wear(
     with connect() as service:
         service.put(f"/gloves/{glove}/wearer", {"subject": subject, "wearing": wearing})
     out.print(f"{glove} is worn by {subject or 'nobody'}.")
+
+
+@app.command("delay")
+def delay(
+    glove: Glove,
+    milliseconds: Annotated[
+        int, typer.Argument(metavar="MS", min=0, max=MOST_DELAY_MS, help="0: live, without a delay.")
+    ],
+) -> None:
+    """Have a glove's live poses wait for the frames after them: less noise, and a lag led back further."""
+    with connect() as service:
+        service.put(f"/gloves/{glove}/delay", {"delay_ms": milliseconds})
+    out.print(f"Poses of {glove} come {milliseconds} ms late." if milliseconds else f"{glove} is live.")
 
 
 @app.command("remove")

@@ -12,6 +12,7 @@ from glovecal_models.hand.rotations import Handedness, known_hand
 from glovecal_models.takes.tap_latency import FEWEST_TAPS
 from glovecal_service.plain import Row
 from glovecal_service.request_types import StrictBody
+from glovecal_service.store.gloves import MOST_DELAY_MS
 from glovecal_service.store.records import RecordingState
 
 
@@ -44,6 +45,12 @@ class LatencyView(Latency):
     measured_at: str = Field(description="ISO 8601.")
 
 
+class Delay(StrictBody):
+    """How long live poses wait."""
+
+    delay_ms: Annotated[int, Field(ge=0, le=MOST_DELAY_MS, description="0: they are live.")]
+
+
 class GloveView(Row):
     name: str
     layout: str | None
@@ -56,6 +63,7 @@ class GloveView(Row):
     last_seen_at: datetime
     assigned_at: datetime | None
     latency: LatencyView | None = Field(None, description="How late it is, as taps on a key showed.")
+    delay_ms: int = Field(0, description="How long its live poses wait for the frames after them.")
 
     @property
     def known_hand(self) -> Handedness | None:

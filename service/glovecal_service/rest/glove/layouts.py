@@ -23,7 +23,7 @@ from glovecal_service.request_types import (
     Title,
     WearingName,
 )
-from glovecal_service.rest.glove.answer import Gloves, GloveView, Latency, LayoutView
+from glovecal_service.rest.glove.answer import Delay, Gloves, GloveView, Latency, LayoutView
 from glovecal_service.rest.glove.live import has_publisher
 from glovecal_service.rest.http.dependencies import PartsNeeded, StoreNeeded
 from glovecal_service.rest.http.problem import Problem, change_problems, problems
@@ -161,6 +161,18 @@ def set_latency(glove: NameInPath, body: Latency, store: StoreNeeded) -> GloveRe
 def forget_latency(glove: NameInPath, store: StoreNeeded) -> GloveRecord:
     store.gloves.get(glove)
     return store.gloves.set_latency(glove, None)
+
+
+@router.put(
+    "/{glove}/delay",
+    response_model=GloveView,
+    summary="Have a glove's live poses wait for the frames after them",
+    responses=change_problems(),
+)
+def set_delay(glove: NameInPath, body: Delay, store: StoreNeeded) -> GloveRecord:
+    """Then they are estimated with what came up to `delay_ms` after each frame, as recordings are with all.
+    A pose has the time of its frame, its age holds the delay, and `pose/meta` says it."""
+    return store.gloves.set_delay(glove, body.delay_ms)
 
 
 def _view(record: LayoutRecord) -> LayoutView:

@@ -13,6 +13,7 @@ from glovecal_models.calibration.explanation import chosen_rotations
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training_settings import Method
 from glovecal_models.comparison.compare import summed_up
+from glovecal_models.comparison.delay_curve import live_and_delayed
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.comparison.where_it_fails import where_it_fails
@@ -58,7 +59,7 @@ def report_on_model(
     assert asked.model is not None
     on = COMPARE.on_takes(store, asked, {})
     found = residuals(asked.loaded, on.takes, offline=body.offline)
-    live = residuals(asked.loaded, on.takes) if body.offline else None
+    causal = live_and_delayed(asked.loaded, on.takes, found) if body.offline else None
     noise = rotation_noise(found)
     others = {}
     for reference in body.beside:
@@ -67,7 +68,7 @@ def report_on_model(
     others.pop(asked.model.id, None)
     page = comparison_page(
         asked.loaded,
-        COMPARE.named(store, asked, summed_up(found, noise, live=live, dimensions=on.hand)),
+        COMPARE.named(store, asked, summed_up(found, noise, causal=causal, dimensions=on.hand)),
         WHERE.named(store, where_asked, where_it_fails(found, noise=noise)),
         found,
         noise,

@@ -11,7 +11,7 @@ from glovecal_service.studio.heading import heading, quiet_act
 from glovecal_service.studio.service import Service, refusals
 from glovecal_service.studio.table import table, text_row
 
-GLOVE_HEADS = ("Glove", "Layout", "Hand", "Worn by", "Wearing", "Measured latency", "Last seen", "")
+GLOVE_HEADS = ("Glove", "Layout", "Hand", "Worn by", "Wearing", "Measured latency", "Delay", "Last seen", "")
 LAYOUT_HEADS = ("Layout", "Sensors", "Rotations", "Of them read from several sensors", "Origin")
 
 
@@ -44,6 +44,7 @@ def _glove(glove: GloveView, service: Service) -> None:
         "not measured"
         if latency is None
         else f"{1000 * latency.latency_s:.0f} ± {1000 * latency.sd_s:.0f} ms",
+        f"{glove.delay_ms} ms" if glove.delay_ms else "live",
         f"{glove.last_seen_at.astimezone():%Y-%m-%d %H:%M}",
     )
 
