@@ -33,7 +33,11 @@ def _delayed_errors(model: CalibrationModel, offline: Residuals) -> tuple[Delaye
         take = item.take
         index = [take.sensors.index(name) for name in model.layout.sensors]
         each = predictor.predict_delayed(
-            take.time_s, take.readings[:, index], take.context, take.wearing, np.array(DELAYS_MS) / 1000
+            take.time_s,
+            take.readings[:, index],
+            take.context,
+            take.wearing,
+            [each / 1000 for each in DELAYS_MS],
         )
         for number, angles in enumerate(each):
             error = angles.mean - item.measured

@@ -111,10 +111,13 @@ def test_a_recording_is_compared_with_both_directions_of_time(walked, tmp_path):
     told = run("compare", id, "--offline", "--report", page)
     sentence = (
         f"with both directions of time: {offline['overall']['rmse_deg']:.2f} degrees, "
-        f"live {live['overall']['rmse_deg']:.2f}."
+        f"live {live['overall']['rmse_deg']:.2f}; with a delay of 0 ms "
     )
-    assert sentence in " ".join(told.out.split())
-    assert sentence in " ".join(page.read_text().split())
+    assert [one["delay_ms"] for one in offline["delayed"]] == [0, 50, 100, 200]
+    for text in (told.out, page.read_text()):
+        assert sentence in " ".join(text.split())
+        assert f"200 ms {offline['delayed'][-1]['rmse_deg']:.2f}." in " ".join(text.split())
+    assert "What a delay would buy" in page.read_text()
 
 
 def test_comparing_agrees_with_the_exported_model(walked, tables, tmp_path):

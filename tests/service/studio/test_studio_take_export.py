@@ -159,6 +159,8 @@ def test_a_models_angles_are_written_with_both_directions_of_time_where_that_is_
     page.get_by_text("Export for animation tools and analysis").click()
     page.get_by_role("combobox", name="Format").click()
     page.get_by_role("option", name="CSV (.csv)").click()
+    page.get_by_role("combobox", name="What").click()
+    page.get_by_role("option", name="Angles of joints").click()
     both_ways = page.get_by_role("checkbox", name="The model's angles with both directions of time")
     expect(both_ways).not_to_be_checked()
     angles = {}
@@ -170,7 +172,7 @@ def test_a_models_angles_are_written_with_both_directions_of_time_where_that_is_
             page.get_by_role("button", name="Export the motion").click()
         saved.value.save_as(tmp_path / f"{name}.csv")
         rows = list(csv.DictReader((tmp_path / f"{name}.csv").read_text().splitlines()))
-        columns = [column for column in rows[0] if column.startswith("r.")]
+        columns = [column for column in rows[0] if column.startswith("p.")]
         angles[name] = np.array([[float(row[column] or "nan") for column in columns] for row in rows])
     difference = angles["offline"] - angles["live"]
     assert 0.01 < np.nanmax(np.abs(difference)) < 30.0
