@@ -28,6 +28,7 @@ def live_and_delayed(model: CalibrationModel, takes: Sequence[Take], offline: Re
 
 def _delayed_errors(model: CalibrationModel, offline: Residuals) -> tuple[DelayedError, ...]:
     """Of the takes of ``offline``, all rotations together, for each of ``DELAYS_MS``."""
+    delays_s = [delay / 1000 for delay in DELAYS_MS]
     predictor, squares = OfflinePredictor(model), [np.empty(0) for _ in DELAYS_MS]
     for item in offline.takes:
         take = item.take
@@ -37,7 +38,7 @@ def _delayed_errors(model: CalibrationModel, offline: Residuals) -> tuple[Delaye
             take.readings[:, index],
             take.context,
             take.wearing,
-            [each / 1000 for each in DELAYS_MS],
+            delays_s,
         )
         for number, angles in enumerate(each):
             error = angles.mean - item.measured
