@@ -1,7 +1,7 @@
 """Tasks worked off by processes of our own, which end with the call, whatever ends it.
 
-``work_off`` has processes for one kind of work; ``side_by_side`` asks those that some caller further out has
-begun, so that work whose parts know nothing of each other says so in one place and takes no number along.
+``work_off`` has processes for one kind of work. ``side_by_side`` asks those that some caller further out has
+begun: they come with the way in which long work is told to stop, which all of it takes along.
 
 Not ``concurrent.futures``, nor a library built like it (loky, joblib): there the caller's thread shares locks
 with the threads that serve the pipes, and a Ctrl-C or a killed worker can leave one taken: the call never
@@ -30,7 +30,6 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -96,22 +95,19 @@ def work_off(
 
 
 @contextmanager
-def shared_workers(workers: int, what: str) -> Iterator[None]:
-    """Within the block ``side_by_side`` uses so many processes, which end with the block; one: this process.
+def shared_workers(workers: int, what: str, cancelled: Cancel | None) -> Iterator[Cancel | None]:
+    """``cancelled`` with so many processes, which ``side_by_side`` uses and which end with the block; one:
+    this process.
 
     ``what`` as in ``work_off``.
     """
     if workers == 1:
-        yield
+        yield cancelled
         return
     pool = _Pool(workers, what)
     try:
         pool.begin()
-        token = _shared.set(pool)
-        try:
-            yield
-        finally:
-            _shared.reset(token)
+        yield _CancelWithPool(cancelled, pool)
     finally:
         pool.end()
 
@@ -119,14 +115,14 @@ def shared_workers(workers: int, what: str) -> Iterator[None]:
 def side_by_side(
     work: Callable[[Task, Cancel | None], Result], tasks: Sequence[Task], cancelled: Cancel | None = None
 ) -> Iterator[Result]:
-    """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` around the call. Where
-    there are none, and in a worker, this process does it, each when it is asked for.
+    """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` that ``cancelled`` brings.
+    Where there are none this process does it, each when it is asked for.
 
     ``work`` as in ``work_off``; it is also told when to stop, unless in a worker, which is ended. Whoever
     asks for no further result leaves the rest undone. Raises Cancelled, WorkerDied, and of what ``work``
     raises the error of the first task.
     """
-    pool = _shared.get()
+    pool = cancelled.pool if isinstance(cancelled, _CancelWithPool) else None
     if pool is None or len(tasks) < 2:
         for task in tasks:
             yield work(task, cancelled)
@@ -236,7 +232,15 @@ class _Pool:
             self._ended.put(_STOP)
 
 
-_shared: ContextVar[_Pool | None] = ContextVar("shared workers", default=None)
+@dataclass(frozen=True)
+class _CancelWithPool:
+    """A ``Cancel`` that brings processes."""
+
+    cancelled: Cancel | None
+    pool: _Pool
+
+    def __call__(self) -> bool:
+        return self.cancelled is not None and self.cancelled()
 
 
 class _Worker:

@@ -89,11 +89,11 @@ def improve(
     if len(take_hashes) == len(takes):
         take_hashes = fitting(take_hashes, odd)
     takes, usable = fitting(takes, odd), usable_sensors(layout, fitting(takes, odd))
-    loop = _Loop(
-        takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
-        cancelled, report, stepped,
-    )  # fmt: skip
-    with shared_workers(workers, "the improvement"):
+    with shared_workers(workers, "the improvement", cancelled) as stopped:
+        loop = _Loop(
+            takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
+            stopped, report, stepped,
+        )  # fmt: skip
         loop.start()
         while len(loop.steps) <= max_steps and loop.go_on():
             pass
