@@ -132,10 +132,10 @@ def side_by_side(
     for number, result in pool.results(partial(_result_or_error, work), tasks, cancelled):
         early[number] = result
         while wanted in early:
-            found = early.pop(wanted)
-            if isinstance(found, Exception):
-                raise found
-            yield found
+            outcome = early.pop(wanted)
+            if isinstance(outcome, Exception):
+                raise outcome
+            yield outcome
             wanted += 1
 
 

@@ -112,9 +112,9 @@ def measured_without(
     for number in range(len(masks)):
         if before_each:
             before_each(number)
-        found = next(results)
-        if found is not None:
-            yield number, found
+        measured = next(results)
+        if measured is not None:
+            yield number, measured
 
 
 def _measured(
@@ -180,13 +180,13 @@ def held_out_errors(
             told = f", error so far {so_far:.2f} degrees" if at else ""
             report(f"leaving out part {at + 1} of {len(folds)}{told}", at / len(folds))
 
-    for _, found in measured_without(
+    for _, summed in measured_without(
         _summed_errors, parts, folds, rotations, wanted, settings,
         optima=optima, before_each=before_each, cancelled=cancelled,
     ):  # fmt: skip
         for name in rotations:
-            square[name] += found.square[name]
-            count[name] += found.count[name]
+            square[name] += summed.square[name]
+            count[name] += summed.count[name]
         if sum(square.values()) > most_square:
             break
     return HeldOutErrors(square, count)

@@ -16,7 +16,6 @@ from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.takes.take import Take
-from glovecal_models.worker_processes import side_by_side
 
 
 def train(
@@ -30,14 +29,13 @@ def train(
     cancelled: Cancel | None = None,
     report: Report | None = None,
 ) -> CalibrationModel:
-    """Plan, fit and assemble, by ``shared_workers`` where there are any; a service spreads the same tasks
-    over its own."""
+    """Plan, fit and assemble in this process; a service spreads the same tasks over workers."""
     plan = plan_training(takes, layout, subject, settings)
-    results, found = [], side_by_side(run_task, plan.tasks, cancelled)
+    results = []
     for done, task in enumerate(plan.tasks):
         if report:
             report(f"fitting {task.rotation}", done / len(plan.tasks))
-        results.append(next(found))
+        results.append(run_task(task, cancelled=cancelled))
     return assemble(plan, results, take_hashes=take_hashes, parent=parent)
 
 
