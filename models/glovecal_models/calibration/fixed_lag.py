@@ -36,8 +36,8 @@ NOISE_EVERY_S = 0.01
 _JERK = (NOISE_EVERY_S / TIMES_S)[:, None, None]
 CLOCK_S = 1e-6
 """Times that differ by less are equal."""
-FIRST_ROWS = 64
-FRAMES_AT_ONCE = 512
+FIRST_KEPT = 64
+SMOOTHED_AT_ONCE = 512
 """Of a take, which bounds the memory."""
 
 
@@ -53,8 +53,8 @@ def delayed(
     for run in unbroken(time_s) if finite else ():
         smoother, times = FixedLagSmoother(angles.shape[1]), time_s[run]
         ends = [last_seen(times, delay) for delay, _ in finite]
-        for start in range(0, len(times), FRAMES_AT_ONCE):
-            stop = min(start + FRAMES_AT_ONCE, len(times))
+        for start in range(0, len(times), SMOOTHED_AT_ONCE):
+            stop = min(start + SMOOTHED_AT_ONCE, len(times))
             for frame in range(start, stop):
                 at = run.start + frame
                 smoother.add(float(times[frame]), angles[at], known[at])
@@ -87,19 +87,19 @@ class FixedLagSmoother:
         every, own = (len(TIMES_S), joints), (len(TIMES_S), 1)
         self._square, self._log_spread, self._count = np.zeros(every), np.zeros(own), np.zeros(1)
         self._rows: dict[str, np.ndarray] = {
-            "angle": np.empty((FIRST_ROWS, joints)),
-            "known": np.empty((FIRST_ROWS, joints), bool),
-            "seen": np.empty((FIRST_ROWS, joints), np.int64),
-            "forward": np.empty((FIRST_ROWS, len(TIMES_S), STATES, STATES)),
-            "state": np.empty((FIRST_ROWS, *every, STATES)),
-            "error": np.empty((FIRST_ROWS, *every)),
-            "square": np.empty((FIRST_ROWS, *every)),
+            "angle": np.empty((FIRST_KEPT, joints)),
+            "known": np.empty((FIRST_KEPT, joints), bool),
+            "seen": np.empty((FIRST_KEPT, joints), np.int64),
+            "forward": np.empty((FIRST_KEPT, len(TIMES_S), STATES, STATES)),
+            "state": np.empty((FIRST_KEPT, *every, STATES)),
+            "error": np.empty((FIRST_KEPT, *every)),
+            "square": np.empty((FIRST_KEPT, *every)),
             # Of all joints together until one of them is not known.
-            "covariance": np.empty((FIRST_ROWS, *own, STATES, STATES)),
-            "gain": np.empty((FIRST_ROWS, *own, STATES)),
-            "weight": np.empty((FIRST_ROWS, *own)),
-            "log_spread": np.empty((FIRST_ROWS, *own)),
-            "count": np.empty((FIRST_ROWS, 1)),
+            "covariance": np.empty((FIRST_KEPT, *own, STATES, STATES)),
+            "gain": np.empty((FIRST_KEPT, *own, STATES)),
+            "weight": np.empty((FIRST_KEPT, *own)),
+            "log_spread": np.empty((FIRST_KEPT, *own)),
+            "count": np.empty((FIRST_KEPT, 1)),
         }
 
     def add(self, time_s: float, angle: np.ndarray, known: np.ndarray) -> None:
