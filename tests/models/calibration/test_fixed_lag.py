@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from glovecal_models.calibration.fixed_lag import FIRST_ROWS, FixedLagSmoother, delayed, last_seen
+from glovecal_models.calibration.fixed_lag import FIRST_KEPT, FixedLagSmoother, delayed, last_seen
 from glovecal_models.calibration.motion_smoother import SHORTEST_RUN, smoothed
 
 RATE_HZ = 100.0
@@ -57,7 +57,7 @@ def test_without_a_delay_it_is_a_filter_and_with_one_it_looks_no_further() -> No
 
 
 def test_frame_by_frame_is_as_the_whole_take() -> None:
-    time_s, _, measured, known = noisy(3 * FIRST_ROWS, 4, 3)
+    time_s, _, measured, known = noisy(3 * FIRST_KEPT, 4, 3)
     time_s = time_s + np.random.default_rng(3).uniform(0, 0.004, len(time_s))
     known[90:95, 2] = False
     [whole] = delayed(time_s, measured, known, [0.1])
