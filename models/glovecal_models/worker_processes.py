@@ -303,6 +303,8 @@ def _begin() -> subprocess.Popen[bytes]:
         [sys.executable, "-P", "-c", _PROGRAM],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        # OpenMP (boosted trees) too: its threads wait by spinning, and workers would slow each other down.
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
         process_group=0,
         creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # the same for Windows
     )
