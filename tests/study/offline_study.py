@@ -174,7 +174,7 @@ def draw_curves(found: Mapping[str, Sequence[Found]], path: Path) -> None:
     curves = {name: (rms := rms_of(each)) / rms[0] for name, each in found.items()}
 
     def draw(axes: Axes) -> None:
-        draw_delay_curves(axes, curves, "error in that of live poses")
+        draw_delay_curves(axes, curves, "error over live error")
         axes.axhline(1.0, color=GREY, linewidth=0.8, linestyle="--")
 
     path.write_bytes(png(Chart(draw, 7, 3.6, "")))

@@ -165,9 +165,13 @@ class Comparison(OnSeenTakes):
             return []
         return [
             f"Estimated offline, with both directions of time: {self.overall.rmse_deg:.2f} degrees, "
-            f"live {self.live.rmse_deg:.2f}; with a delay of "
-            f"{', '.join(f'{item.delay_ms} ms {item.rmse_deg:.2f}' for item in self.delayed)}."
+            f"live {self.live.rmse_deg:.2f}{self._with_delays()}."
         ]
+
+    def _with_delays(self) -> str:
+        """Empty for an answer from before they were told."""
+        each = ", ".join(f"{item.delay_ms} ms {item.rmse_deg:.2f}" for item in self.delayed)
+        return f"; with a delay of {each}" if each else ""
 
     def _of_wearings(self) -> list[str]:
         """The error in wearings not seen in training, then in those seen."""
@@ -282,12 +286,12 @@ class Comparison(OnSeenTakes):
 
     def _delay_chart(self) -> list[Part]:
         """From live poses over those of a glove that is served with a delay to offline."""
-        if self.live is None:
+        if self.live is None or not self.delayed:
             return []
         errors = [self.live.rmse_deg, *(item.rmse_deg for item in self.delayed), self.overall.rmse_deg]
         sentence = (
             f"{self.live.rmse_deg:.2f} degrees live, {self.overall.rmse_deg:.2f} when all frames are known. "
-            f"To serve a glove with a delay: glovecal glove delay GLOVE 100"
+            "To serve a glove with a delay: glovecal glove delay GLOVE 100"
         )
         return [
             Chart(
