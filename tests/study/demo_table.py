@@ -1,28 +1,27 @@
 """``python3 do.py study demos``: is anything told in the demo that is not so?
 
-The second act of ``do.py demo`` for many seeds and effects: the demo's own requests, answered by library
-calls in this process; every saying is held against what was hidden. Finished demos are kept: an interrupted
-table goes on.
+The second act of ``do.py demo`` for many seeds and effects, asked of one ``glovecal serve``; every saying is
+held against what was hidden. Finished demos are kept: an interrupted table goes on.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import time
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import Any
 
 from finished_gloves import FinishedGloves, software_hash
-from library_service import LibraryService
 
 from glovecal_client.rest import RestClient
 from glovecal_models.diagnosis.answer import MissingEffects
-from glovecal_models.worker_processes import pin_blas_to_one_thread
+from glovecal_service.demo.processes import demo_place, running_service
 from glovecal_service.demo.second_act import hidden_contract, is_right, prepare, second_act, told_wrongly
 from glovecal_service.first_run.hidden_session import RANDOM_EFFECTS, TAKE_S, hidden_session
 
@@ -47,7 +46,6 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--folder", type=Path, default=Path(".study"), help="for answers and the table")
     parser.add_argument("--smoke", action="store_true", help="one demo of short takes: seconds")
     options = parser.parse_args(arguments)
-    pin_blas_to_one_thread()
     if options.smoke:
         with TemporaryDirectory(prefix="glovecal-study-") as folder:
             print(table(answers([("cross_coupling", 3)], Path(folder), take_s=10.0)))
@@ -73,21 +71,25 @@ def answers(
     keys = [json.dumps({"effect": effect, "seed": seed}, sort_keys=True) for effect, seed in demos]
     waiting = [demo for demo, key in zip(demos, keys, strict=True) if kept.get(key) is None]
     if waiting and not is_all_known:
-        for effect, seed in waiting:
-            key, begin = json.dumps({"effect": effect, "seed": seed}, sort_keys=True), time.process_time()
-            answer = demo_answer(effect, seed, take_s)
-            took_s = time.process_time() - begin
-            kept.keep(key, answer, took_s)
-            print(f"{effect} {seed}: {took_s:.0f} s", file=sys.stderr, flush=True)
+        with (
+            TemporaryDirectory(prefix="glovecal-demos-") as place,
+            running_service(demo_place(Path(place))) as service,
+        ):
+            for effect, seed in waiting:
+                key, begin = json.dumps({"effect": effect, "seed": seed}, sort_keys=True), time.monotonic()
+                answer = demo_answer(service, effect, seed, take_s)
+                took_s = time.monotonic() - begin
+                kept.keep(key, answer, took_s)
+                print(f"{effect} {seed}: {took_s:.0f} s", file=sys.stderr, flush=True)
     return [answer for key in keys if (answer := kept.get(key)) is not None]
 
 
-def demo_answer(effect: str, seed: int, take_s: float) -> dict[str, Any]:
-    """One demo: what was hidden, all that was told, and what of it is wrong."""
+def demo_answer(service: RestClient, effect: str, seed: int, take_s: float) -> dict[str, Any]:
+    """One demo, by a subject of its own: what was hidden, all that was told, and what of it is wrong."""
     hidden = hidden_session(effect, seed, take_s=take_s)
-    service, told = cast(RestClient, LibraryService()), []
+    told: list[str] = []
     with TemporaryDirectory(prefix="glovecal-demos-") as place:
-        found = prepare(service, hidden, Path(place))
+        found = prepare(service, hidden, Path(place), subject=re.sub("[^a-z0-9]+", "-", f"{effect}-{seed}"))
     second_act(service, found, told.append, lambda _: None)
     figures = hidden_contract(hidden, found)
     wrong = told_wrongly(hidden, found)

@@ -49,7 +49,7 @@ def test_finished_demos_are_put_into_their_page(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_demo_is_asked_by_library_calls(tmp_path: Path):
+def test_a_demo_is_asked_of_a_real_service(tmp_path: Path):
     [found] = answers([("cross_coupling", 3)], tmp_path, take_s=10.0)
     assert found["hidden"]["right"]
     assert found["error_fall_deg"]["with_effect"] < found["error_fall_deg"]["lmc_gpr"]

@@ -110,11 +110,14 @@ def warmed(takes: Sequence[Take], counts: float) -> list[Take]:
     return read_as(takes, [counts * (part - every.mean()) / every.std() for part in columns])
 
 
-@pytest.mark.parametrize(("counts", "is_named"), [(0.42, False), (6.0, True)])
+@pytest.mark.parametrize(("counts", "is_named"), [(0.9, False), (6.0, True)])
 def test_beside_an_effect_what_a_healthy_glove_slips_by_gets_no_name(healthy, counts, is_named):
-    """A column that goes along with the slip of cloth by chance, and one that measures a cause."""
+    """A column that goes along with the slip of cloth, and one that measures a cause."""
     takes = warmed(healthy, counts)
-    found = diagnose(takes, LAYOUT, known=[PULL], effects=[effect("temperature")], signatures=False)
+    limits = replace(DIAGNOSIS_LIMITS, healthy_deg=1.0)
+    found = diagnose(
+        takes, LAYOUT, known=[PULL], effects=[effect("temperature")], signatures=False, limits=limits
+    )
     assert [item.effect for item in found.naming.ranked] == ["temperature"] * is_named
     alone = diagnose(takes, LAYOUT, effects=[effect("temperature")], signatures=False)
     assert alone.naming.ranked, "a first effect may be as small"

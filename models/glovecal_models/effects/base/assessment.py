@@ -172,7 +172,8 @@ class Assessment:
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
-        is_clear = largest >= self.limits.clear_share
+        # what a model's effects leave of themselves in a few takes may go along with a wearing by chance
+        is_clear = largest >= self.limits.clear_share and not any(self.known_saved_square)
         most = self.certainty.clear if is_clear else self.certainty.faint
         if p_value > (min(most, self.certainty.of_few_takes) if self._has_few_takes else most):
             return ()

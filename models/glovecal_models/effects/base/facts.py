@@ -106,9 +106,9 @@ class Certainty:
     more is asked of few takes."""
 
     clear: float
-    """Where the effect saves a large share of the error."""
+    """Where the effect saves a large share of the error of a model without effects."""
     faint: float
-    """Where it saves less."""
+    """Where it saves less, or the model has effects."""
     of_few_takes: float
     """Where there are few takes, whatever it saves. 1: as where there are many, also within takes."""
     why: str

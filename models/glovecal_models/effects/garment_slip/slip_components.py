@@ -51,7 +51,8 @@ class SlipComponents:
     """Of one rotation."""
 
     size_deg: float
-    """Standard deviation over the session of all that is slip."""
+    """Standard deviation over the session of all that is slip, no more than that of the error itself: what a
+    curve and a walk take from each other in a few takes is in neither."""
     likelier: float
     """Twice the log of the likelihood ratio, against a slip as of every glove."""
     kind: str
@@ -87,9 +88,12 @@ def slip_components(
     without_wearings = {name: MOST_LOG if name[0] != WORN else LEAST_LOG for name in parts}
     worn_alike, _ = likelihood.highest(without_wearings, logs)
     return SlipComponents(
-        float(np.sqrt(sum(sizes.values()))), 2 * (free - held), max(sizes, key=lambda kind: sizes[kind]),
-        2 * (free - worn_alike), len(pieces.error),
-    )  # fmt: skip
+        size_deg=min(float(np.sqrt(sum(sizes.values()))), spread),
+        likelier=2 * (free - held),
+        kind=max(sizes, key=lambda kind: sizes[kind]),
+        wearings_likelier=2 * (free - worn_alike),
+        pieces=len(pieces.error),
+    )
 
 
 def likelier_with_cause(
