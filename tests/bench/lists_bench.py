@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import shutil
 import statistics
 import tempfile
 import time
@@ -138,10 +137,11 @@ def _median_ms(http: httpx.Client, path: str, query: dict[str, str]) -> float:
 
 
 def _pages(url: str) -> Iterator[tuple[str, float]]:
-    if shutil.which("chromium") is None:
-        print("Chromium is not installed (Debian: apt-get install chromium): pages were not measured.")
+    from studio_support import NO_CHROMIUM, installed_chromium, running_browser
+
+    if installed_chromium() is None:
+        print(f"{NO_CHROMIUM}: pages were not measured.")
         return
-    from studio_support import running_browser
 
     with running_browser() as browser:
         for name in PAGES:

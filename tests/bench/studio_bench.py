@@ -14,7 +14,6 @@ import json
 import multiprocessing
 import operator
 import os
-import shutil
 import tempfile
 import threading
 import time
@@ -29,7 +28,7 @@ from playwright.sync_api import Browser, Page
 from realtime_support import free_endpoint, part_of_service
 from streaming_bench import random_model
 from streaming_load import Load, drive
-from studio_support import running_browser
+from studio_support import NO_CHROMIUM, installed_chromium, running_browser
 
 from glovecal_client.keys import GloveKeys
 from glovecal_client.session import open_client
@@ -142,8 +141,8 @@ def main() -> None:
     )
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
-    if shutil.which("chromium") is None:
-        print("Chromium is not installed (Debian: apt-get install chromium): the studio was not measured.")
+    if installed_chromium() is None:
+        print(f"{NO_CHROMIUM}: the studio was not measured.")
         return
     pin_blas_to_one_thread()
     seconds = 4.0 if options.smoke else 8.0 if options.quick else 20.0

@@ -24,7 +24,7 @@ from glovecal_service.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "studio"))
 
-from studio_support import running_browser
+from studio_support import NO_CHROMIUM, installed_chromium, running_browser
 
 CONF = Path(__file__).resolve().parents[3] / "docker" / "nginx.conf"
 NAME = "glovecal.example"
@@ -195,8 +195,8 @@ def test_a_proxy_on_this_computer_lets_others_in_who_are_asked(tmp_path: Path) -
 
 @pytest.mark.needs_chromium
 def test_pages_work_in_a_browser(proxied: Proxied, not_here: Callable[[str], NoReturn]) -> None:
-    if shutil.which("chromium") is None:
-        not_here("Chromium is not installed (Debian: apt-get install chromium)")
+    if installed_chromium() is None:
+        not_here(NO_CHROMIUM)
     with running_browser(f"--host-resolver-rules=MAP {NAME} 127.0.0.1") as browser:
         context = browser.new_context(ignore_https_errors=True)
         context.set_default_timeout(120_000)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -17,7 +16,7 @@ from playwright.sync_api import Browser, ViewportSize
 sys.path.insert(0, str(Path(__file__).parent))
 
 from realtime_support import free_endpoint, part_of_service, store_model
-from studio_support import PATIENCE_MS, Open, Opened, running_browser
+from studio_support import NO_CHROMIUM, PATIENCE_MS, Open, Opened, installed_chromium, running_browser
 from unpacked_example import unpacked_example
 
 from glovecal_service.serve import real_time, web
@@ -66,8 +65,8 @@ def trained(address: str) -> str:
 
 @pytest.fixture(scope="package")
 def browser(not_here: Callable[[str], NoReturn]) -> Iterator[Browser]:
-    if shutil.which("chromium") is None:
-        not_here("Chromium is not installed (Debian: apt-get install chromium)")
+    if installed_chromium() is None:
+        not_here(NO_CHROMIUM)
     with running_browser("--webgl-antialiasing-mode=none") as browser:
         yield browser
 
