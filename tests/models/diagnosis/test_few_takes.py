@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.text import diagnosis_sentences
-from glovecal_models.effects.base.assessment import Assessment, JointErrors
+from glovecal_models.effects.base.assessment import Assessment, JointErrors, signed_rank
 from glovecal_models.effects.base.facts import BETWEEN_TAKES
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -46,11 +48,24 @@ def test_a_large_share_needs_no_more_certainty_unless_one_take_has_it_all():
     assert not assessed(6, alone).significant_joints
 
 
+def test_a_large_share_of_a_few_blocks_needs_more_certainty():
+    saved = np.tile([0.04, 0.04, 0.04, -0.02], (6, 1))
+    saved[:3, 0] = 0.95
+    steady = assessed(6, saved)
+    base = np.where(saved.ravel() > 0.9, 2000.0, 100.0)
+    errors = replace(steady.errors[0], base=base, added=base * (1.0 - saved.ravel()), control=base)
+    assert errors.contrast_of_several > 0.5
+    assert signed_rank(errors.beyond_control) < 0.002
+    assert not replace(steady, errors=(errors,)).significant_joints
+
+
 def test_a_column_that_goes_along_with_few_takes_is_chance_more_often():
-    everywhere = mostly(0.3, 12)
+    everywhere = mostly(0.6, 12)
     between = (BETWEEN_TAKES.of_few_takes, BETWEEN_TAKES.clear)
     for p_value, takes, is_named in ((between[0], 6, True), (between[1], 6, False), (between[1], 12, True)):
         assert bool(assessed(takes, everywhere[:takes], p_value).significant_joints) is is_named
+    assert not assessed(6, mostly(0.3, 6), between[0]).significant_joints
+    assert assessed(12, mostly(0.3, 12), between[0]).significant_joints
     alone = np.zeros((6, BLOCKS_OF_A_TAKE))
     alone[2] = 0.9
     assert not assessed(6, alone, between[0]).significant_joints

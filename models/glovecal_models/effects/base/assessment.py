@@ -163,12 +163,17 @@ class Assessment:
         if errors.contrast < limits.least_share:
             return False
         rare_p_value = limits.rare_p_value
-        if self._has_few_takes and errors.contrast_of_several < limits.few_takes_large_share:
+        if self._has_few_takes and not self._is_large_throughout(errors, p_value):
             p_value, rare_p_value = (min(each, limits.few_takes_p_value) for each in (p_value, rare_p_value))
         if signed_rank(errors.beyond_control, limits.fewest_blocks) <= p_value:
             return True
         is_large = errors.contrast >= limits.rare_share
         return is_large and random_signs(errors.beyond_control, limits.fewest_blocks) <= rare_p_value
+
+    def _is_large_throughout(self, errors: JointErrors, p_value: float) -> bool:
+        """In more takes than one and, by sum as by rank, not in a few blocks."""
+        is_large = errors.contrast_of_several >= self.limits.few_takes_large_share
+        return is_large and random_signs(errors.beyond_control, self.limits.fewest_blocks) <= p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
         largest = max((item.contrast for item in self.errors), default=0.0)
@@ -179,9 +184,12 @@ class Assessment:
             return ()
         least = self.limits.least_session_share
         some = [i for i, item in enumerate(self.errors) if item.contrast >= least]
-        if self._has_few_takes:
-            some = [i for i in some if self.errors[i].contrast_of_several >= 0.5 * least]
-        return tuple(some)
+        if not self._has_few_takes:
+            return tuple(some)
+        several = [item.contrast_of_several for item in self.errors]
+        if max(several, default=0.0) < self.limits.few_takes_large_share:
+            return ()
+        return tuple(i for i in some if several[i] >= 0.5 * least)
 
     @cached_property
     def _has_few_takes(self) -> bool:
