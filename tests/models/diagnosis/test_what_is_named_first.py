@@ -19,13 +19,13 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import SessionPlan
 
-BLOCKS = 12
+BLOCKS = 36
 SENSOR_OF = {"J0": "J0", "J1": "J1"}
 
 
 def ranked(name: str, saved: float, joints: int = 2, square: float = 4.0) -> Assessment:
     """An effect that saves this share of a squared error of ``square`` per row on every joint."""
-    take = np.repeat(np.arange(4), BLOCKS // 4)
+    take = np.repeat(np.arange(12), BLOCKS // 12)
     base = np.full(BLOCKS, 100 * square)
     errors = tuple(JointErrors(base, (1 - saved) * base, base, 100 * BLOCKS, take) for _ in range(joints))
     nothing = tuple(np.empty(0) for _ in range(joints))

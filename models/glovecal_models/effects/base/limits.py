@@ -56,8 +56,8 @@ class SignificanceLimits:
     few_takes_large_share: float = limit(
         0.5,
         "share of the squared error",
-        "But not where an effect saves so much beyond its control, the take that it saves most in left out, in"
-        " many blocks. A cause that changes from take to take must save so much.",
+        "But not where an effect saves so much beyond its control, the take that it saves most in left out,"
+        " in many blocks. A cause that changes from take to take must save so much.",
         "The same gloves: false names that saved more did so in one take. Creep of nine takes of 20 s that"
         " saves 0.7 is named. Of 320 others two columns that changed by chance saved 0.25 and 0.31, true ones"
         " of two weak gloves of each cause 0.58 and more.",
