@@ -117,7 +117,7 @@ def asked(takes: Sequence[Take], layout: Layout, choices: Choices) -> State:
 def concluded(state: State) -> Diagnosis:
     """What a user is told of the state after all rules."""
     question, problem = state.question, state.problem
-    apart_by = _apart_by(state.naming, question.known)
+    apart_by = _apart_by(state)
     diagnosis = Diagnosis(
         joints=problem.joints,
         rmse_deg=_held_out_errors(state.design),
@@ -144,13 +144,19 @@ def concluded(state: State) -> Diagnosis:
     return replace(diagnosis, next_take=following or take_to_decide(state.not_identifiable, state.residual))
 
 
-def _apart_by(naming: Naming, known: Sequence[KnownEffect]) -> frozenset[str]:
+def _apart_by(state: State) -> frozenset[str]:
     """Rotations whose takes may read differently at one angle: what is named, or what the model has, changes
-    from take to take there."""
-    first = naming.ranked[:1] if naming.ranked and naming.ranked[0].p_value is not None else ()
-    named_there = {item.joints[i] for item in first for i in item.significant_joints}
-    known_there = {name for item in known if is_between_takes(item.effect) for name in item.joints}
-    return frozenset(named_there | known_there)
+    from take to take there. What would be named of more takes may act on every sensor."""
+    ranked, known = state.naming.ranked[:1], state.question.known
+    named = {item.joints[i] for item in ranked if item.p_value is not None for i in item.significant_joints}
+    faint = {
+        name
+        for item in state.assessments
+        if not ranked and item.p_value is not None and item.as_of_many_takes.significant_joints
+        for name in item.joints
+    }
+    of_model = {name for item in known if is_between_takes(item.effect) for name in item.joints}
+    return frozenset(named | faint | of_model)
 
 
 def _next_take(diagnosis: Diagnosis, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:

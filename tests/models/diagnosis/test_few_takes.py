@@ -80,3 +80,12 @@ def test_what_few_takes_show_faintly_asks_for_more_takes():
     assert f"Not identifiable: hysteresis, lag. Reason: {reason}." in diagnosis_sentences(found)
     assert found.next_take is not None
     assert found.next_take.separates == ("hysteresis", "lag", "chance")
+
+
+def test_takes_that_a_faint_cause_may_move_apart_contradict_no_reference():
+    plan = SessionPlan(seed=5004, wearings=3, takes_per_wearing=4, take_s=20.0)
+    every = record_session(plan, [Cause("temperature", "quadratic", 3.0)]).takes
+    found = diagnose([take for number, take in enumerate(every) if number % 4 < 3], LAYOUT)
+    assert found.named is None
+    assert {item.effect for item in found.not_identifiable} >= {"temperature"}
+    assert found.reference_problems == ()
