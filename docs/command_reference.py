@@ -10,14 +10,14 @@ from typing import Any
 
 import typer.main
 
-from glovecal_service.cli.command import app
+from glovecal_service.cli.command import some_verbs
 
 _SPECIAL = re.compile(r"([\\`*_<>\[\]|{}~#])")
 
 
 def command_reference() -> str:
     """Every command of ``glovecal``, with its arguments and options as tables (MyST Markdown)."""
-    root = typer.main.get_command(app)
+    root = typer.main.get_command(some_verbs())
     return "\n\n".join(_described(root, ("glovecal",)))
 
 

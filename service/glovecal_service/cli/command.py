@@ -11,8 +11,9 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 import typer
 import typer.main
@@ -20,94 +21,97 @@ import typer.main
 from glovecal_client.operating_system import HANG_UP, STOP_SIGNALS
 from glovecal_client.program import handle_signals, run_command
 from glovecal_client.site.member import settle_environment
-from glovecal_service.cli import backup, completion, demo, overview, serve, worker
-from glovecal_service.cli.access import audit, encryption, keys, log_mark, people
-from glovecal_service.cli.asking import verb, verb_at_once
-from glovecal_service.cli.camera import cameras
-from glovecal_service.cli.effect import catalogue, changes, improvement
-from glovecal_service.cli.glove import (
-    bridge,
-    capture,
-    card,
-    card_session,
-    doctor,
-    emulate,
-    find_port,
-    layouts,
-    recordings,
-    shapes,
-    trigger,
-    watch,
-)
-from glovecal_service.cli.job import jobs
-from glovecal_service.cli.model import comparison, models, quick_check, training
-from glovecal_service.cli.sampling import samplings
-from glovecal_service.cli.site import sites
-from glovecal_service.cli.subject import subjects
-from glovecal_service.cli.take import takes
+from glovecal_service.cli import completion
 from glovecal_service.cli.terminal.printing import EXPECTED, INTERRUPTED, err, exit_code_of, out, sentence_of
-from glovecal_service.questions.catalogue import AT_ONCE, QUESTIONS
 from glovecal_service.secret_files import settle_secrets
 
 HELP = ["-h", "--help"]
 
-app = typer.Typer(
-    name="glovecal",
-    help="Joint rotations you can trust, from data gloves.\n\n"
-    "With GLOVECAL_URL set it speaks to that service, else it works on the local folder GLOVECAL_DATA "
-    "(./glovecal-data).",
-    invoke_without_command=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
 START, GLOVES, TAKES, CALIBRATE, EXPLAIN, KEEP = (
     "Start", "Gloves", "Record and import", "Calibrate", "Compare, find what is missing, add it",
     "What is kept, and long work",
 )  # fmt: skip
 """What people do, in the order in which they do it."""
-app.command("demo", rich_help_panel=START)(demo.demo)
-app.command("serve", rich_help_panel=START)(serve.serve)
-app.command("worker", rich_help_panel=START)(worker.worker)
-app.command("completion", rich_help_panel=START)(completion.completion)
-app.command("capture", cls=capture.WithDeviceOptions, rich_help_panel=GLOVES)(capture.capture)
-app.command("find-port", rich_help_panel=GLOVES)(find_port.find_port)
-app.command("watch", rich_help_panel=GLOVES)(watch.watch)
-app.command("bridge", cls=bridge.WithBridgeOptions, rich_help_panel=GLOVES)(bridge.bridge)
-app.command("doctor", rich_help_panel=GLOVES)(doctor.doctor)
-app.command("emulate", cls=emulate.WithFaults, rich_help_panel=GLOVES)(emulate.emulate)
-app.command("card", rich_help_panel=GLOVES)(card_session.card)
-app.add_typer(cameras.app, name="camera", rich_help_panel=GLOVES)
-app.add_typer(layouts.app, name="glove", rich_help_panel=GLOVES)
-app.command("record", rich_help_panel=TAKES)(recordings.record)
-app.command("trigger", rich_help_panel=TAKES)(trigger.trigger)
-app.add_typer(samplings.app, name="sample", rich_help_panel=TAKES)
-app.command("shapes", rich_help_panel=TAKES)(shapes.shapes)
-app.add_typer(takes.app, name="take", rich_help_panel=TAKES)
-app.command("read-card", rich_help_panel=TAKES)(card.read_card)
-app.command("train", rich_help_panel=CALIBRATE)(training.train)
-app.command("quick-check", rich_help_panel=CALIBRATE)(quick_check.quick_check)
-app.command("improve", cls=improvement.SeveralFiles, rich_help_panel=CALIBRATE)(improvement.improve)
-app.command("compare", rich_help_panel=EXPLAIN)(comparison.compare)
-app.command("where", rich_help_panel=EXPLAIN)(comparison.where)
-for question in QUESTIONS.values():
-    if question.verb is not None:
-        app.command(question.verb, rich_help_panel=EXPLAIN)(verb(question))
-for question in AT_ONCE.values():
-    if question.verb is not None:
-        app.command(question.verb, rich_help_panel=EXPLAIN)(verb_at_once(question))
-app.command("add-effect", rich_help_panel=EXPLAIN)(changes.add_effect)
-app.command("remove-effect", rich_help_panel=EXPLAIN)(changes.remove_effect)
-app.command("effects", rich_help_panel=EXPLAIN)(catalogue.effects)
-app.add_typer(models.app, name="model", rich_help_panel=KEEP)
-app.add_typer(subjects.app, name="subject", rich_help_panel=KEEP)
-app.add_typer(jobs.app, name="job", rich_help_panel=KEEP)
-app.add_typer(keys.app, name="key", rich_help_panel=KEEP)
-app.add_typer(people.app, name="person", rich_help_panel=KEEP)
-app.add_typer(backup.app, name="backup", rich_help_panel=KEEP)
-app.add_typer(encryption.app, name="encryption", rich_help_panel=KEEP)
-app.add_typer(audit.app, name="audit", rich_help_panel=KEEP)
-app.command("log-mark", rich_help_panel=KEEP)(log_mark.log_mark)
-app.add_typer(sites.app, name="site", rich_help_panel=KEEP)
+
+
+class Verb(NamedTuple):
+    """Where a verb is written: read when it is asked for, as that takes most of a short command's time."""
+
+    panel: str
+    module: str
+    """Below this package."""
+    attribute: str
+    """A function, or the ``Typer`` of several verbs below this one."""
+    form: str = ""
+    """The command's own class, in the same module; empty: the usual one."""
+
+
+VERBS = {
+    "demo": Verb(START, "demo", "demo"),
+    "serve": Verb(START, "serve", "serve"),
+    "worker": Verb(START, "worker", "worker"),
+    "completion": Verb(START, "completion", "completion"),
+    "capture": Verb(GLOVES, "glove.capture", "capture", "WithDeviceOptions"),
+    "find-port": Verb(GLOVES, "glove.find_port", "find_port"),
+    "watch": Verb(GLOVES, "glove.watch", "watch"),
+    "bridge": Verb(GLOVES, "glove.bridge", "bridge", "WithBridgeOptions"),
+    "doctor": Verb(GLOVES, "glove.doctor", "doctor"),
+    "emulate": Verb(GLOVES, "glove.emulate", "emulate", "WithFaults"),
+    "card": Verb(GLOVES, "glove.card_session", "card"),
+    "camera": Verb(GLOVES, "camera.cameras", "app"),
+    "glove": Verb(GLOVES, "glove.layouts", "app"),
+    "record": Verb(TAKES, "glove.recordings", "record"),
+    "trigger": Verb(TAKES, "glove.trigger", "trigger"),
+    "sample": Verb(TAKES, "sampling.samplings", "app"),
+    "shapes": Verb(TAKES, "glove.shapes", "shapes"),
+    "take": Verb(TAKES, "take.takes", "app"),
+    "read-card": Verb(TAKES, "glove.card", "read_card"),
+    "train": Verb(CALIBRATE, "model.training", "train"),
+    "quick-check": Verb(CALIBRATE, "model.quick_check", "quick_check"),
+    "improve": Verb(CALIBRATE, "effect.improvement", "improve", "SeveralFiles"),
+    "compare": Verb(EXPLAIN, "model.comparison", "compare"),
+    "where": Verb(EXPLAIN, "model.comparison", "where"),
+    "": Verb(EXPLAIN, "questions", "add_questions"),
+    "add-effect": Verb(EXPLAIN, "effect.changes", "add_effect"),
+    "remove-effect": Verb(EXPLAIN, "effect.changes", "remove_effect"),
+    "effects": Verb(EXPLAIN, "effect.catalogue", "effects"),
+    "model": Verb(KEEP, "model.models", "app"),
+    "subject": Verb(KEEP, "subject.subjects", "app"),
+    "job": Verb(KEEP, "job.jobs", "app"),
+    "key": Verb(KEEP, "access.keys", "app"),
+    "person": Verb(KEEP, "access.people", "app"),
+    "backup": Verb(KEEP, "backup", "app"),
+    "encryption": Verb(KEEP, "access.encryption", "app"),
+    "audit": Verb(KEEP, "access.audit", "app"),
+    "log-mark": Verb(KEEP, "access.log_mark", "log_mark"),
+    "site": Verb(KEEP, "site.sites", "app"),
+}
+"""In the order of ``glovecal -h``. Verbs of questions have their names from these: all stand under none."""
+
+
+def some_verbs(names: Sequence[str] = tuple(VERBS)) -> typer.Typer:
+    """The command with these verbs of ``VERBS``, all by default."""
+    app = typer.Typer(
+        name="glovecal",
+        help="Joint rotations you can trust, from data gloves.\n\n"
+        "With GLOVECAL_URL set it speaks to that service, else it works on the local folder GLOVECAL_DATA "
+        "(./glovecal-data).",
+        invoke_without_command=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(options)
+    for name in names:
+        panel, place, attribute, form = VERBS[name]
+        module = import_module(f"glovecal_service.cli.{place}")
+        found = getattr(module, attribute)
+        if not name:
+            found(app, panel)
+        elif isinstance(found, typer.Typer):
+            app.add_typer(found, name=name, rich_help_panel=panel)
+        else:
+            app.command(name, cls=getattr(module, form) if form else None, rich_help_panel=panel)(found)
+    return app
 
 
 def _print_version(wanted: bool) -> None:
@@ -116,7 +120,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def options(
     context: typer.Context,
     show_version: Annotated[
@@ -125,15 +128,26 @@ def options(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        overview.print_overview()
+        from glovecal_service.cli.overview import print_overview
+
+        print_overview()
 
 
 @cache
-def command() -> Callable[..., Any]:
-    """The verbs of ``app``, which take a fifth of a second to put together."""
-    verbs = typer.main.get_command(app)
+def command(names: tuple[str, ...] = tuple(VERBS)) -> Callable[..., Any]:
+    """These verbs of ``VERBS``, all by default."""
+    verbs = typer.main.get_command(some_verbs(names))
     _name_help(verbs)
     return verbs
+
+
+def _asked(arguments: Sequence[str]) -> tuple[str, ...]:
+    """What has to be read for these arguments: of a verb that is known, it alone."""
+    first = next((item for item in arguments if not item.startswith("-")), None)
+    if first in VERBS:
+        return (first,)
+    is_alone = first is None and not {"--help", *HELP} & {*arguments}
+    return () if is_alone and completion.VARIABLE not in os.environ else tuple(VERBS)
 
 
 def _name_help(verb: Any) -> None:
@@ -156,7 +170,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settle_environment()
     try:
         settle_secrets()
-        command()(arguments, prog_name=completion.PROGRAM)
+        given = sys.argv[1:] if arguments is None else arguments
+        command(_asked(given))(arguments, prog_name=completion.PROGRAM)
     except KeyboardInterrupt:
         err.print("interrupted")
         sys.exit(INTERRUPTED)

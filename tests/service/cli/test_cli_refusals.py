@@ -14,7 +14,7 @@ from glovecal_client.capture.cyberglove.device import CyberGlove
 from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.session import DEFAULT_ENDPOINT
 from glovecal_models.calibration.training_settings import METHODS
-from glovecal_service.cli.command import app
+from glovecal_service.cli.command import some_verbs
 from glovecal_service.cli.terminal import options
 from glovecal_service.questions.train import TrainingRequest
 from glovecal_service.request_types import IDENTIFIER, SUBJECT
@@ -32,14 +32,14 @@ VERBS = [
 @pytest.mark.parametrize("verb", VERBS, ids=" ".join)
 def test_every_verb_explains_itself(verb):
     """Typer's own runner; no service is touched."""
-    answer = CliRunner().invoke(app, [*verb, "--help"], env={"COLUMNS": "80"})
+    answer = CliRunner().invoke(some_verbs(), [*verb, "--help"], env={"COLUMNS": "80"})
     assert answer.exit_code == 0
     assert "Usage" in answer.output
     assert max(map(len, answer.output.splitlines())) <= 80
 
 
 def test_capture_explains_the_options_of_each_device(capsys):
-    told = CliRunner().invoke(app, ["capture", "--help"], env={"COLUMNS": "80"}).output
+    told = CliRunner().invoke(some_verbs(), ["capture", "--help"], env={"COLUMNS": "80"}).output
     with pytest.raises(SystemExit):
         capture_alone(["--help"])
     for text in (" ".join(told.split()), " ".join(capsys.readouterr().out.split())):
