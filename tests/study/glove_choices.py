@@ -13,7 +13,7 @@ from typing import TypeVar, get_args
 
 import numpy as np
 from blind_glove import BlindGlove, Bystander, Nuisance
-from further_forms import every_form
+from further_forms import dealt_forms
 
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES, UNKNOWN_CAUSES
 from glovecal_models.simulation.causes.form import Cause, Form
@@ -67,7 +67,7 @@ def with_cause(
     part: str, name: str, size: float, number: int, *, set_aside: bool = False
 ) -> BlindGlove | None:
     """A glove with one cause; None when the cause has no set-aside form."""
-    chosen = [form for form in every_form(name) if form.set_aside == set_aside]
+    chosen = dealt_forms(name, set_aside=set_aside)
     if not chosen:
         return None
     label = (part, name, size, set_aside)
@@ -128,7 +128,7 @@ def pair(number: int, size: float, *, set_aside: bool = False) -> BlindGlove:
     label = ("pairs", size, set_aside)
     causes = []
     for name in names:
-        chosen = [form for form in every_form(name) if form.set_aside == set_aside]
+        chosen = dealt_forms(name, set_aside=set_aside)
         form = dealt(chosen, number, *label, name)
         causes.append(Cause(name, form.name, size * FLOOR_DEG))
     return _glove("pairs", "+".join(names), size, number, label, tuple(causes), "none", set_aside=set_aside)

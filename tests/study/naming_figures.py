@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from diagnosis_answer import NOTHING
-from further_forms import unlike_open_forms
 from glove_choices import NUISANCES
 from glove_jobs import Row
 from study_figure import StudyFigure
@@ -42,24 +41,7 @@ def names_figures(rows: Sequence[Row]) -> list[StudyFigure]:
             some = [row for row in mine if row[0].size == size]
             label = f"right effect first at {size:g} x floor{forms}"
             found += _judged(some, label) if size == JUDGED_SIZE else _first(some, label, {}, {})
-            found += _by_author(some, f"right effect first at {size:g} x floor")
     return found
-
-
-def _by_author(rows: Sequence[Row], label: str) -> list[StudyFigure]:
-    """Set-aside forms by what their authors were asked for."""
-    if not rows[0][0].set_aside:
-        return []
-    unlike = [any(cause.form in unlike_open_forms(cause.name) for cause in row[0].causes) for row in rows]
-    parts = ((False, "that their author expects most often"), (True, "of laws that no other form has"))
-    return [
-        StudyFigure.share(
-            f"{label}, set-aside forms {what}",
-            [right_first(row) for row, other in zip(rows, unlike, strict=True) if other is wanted],
-        )
-        for wanted, what in parts
-        if wanted in unlike
-    ]
 
 
 def _judged(rows: Sequence[Row], label: str) -> list[StudyFigure]:

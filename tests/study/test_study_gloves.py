@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from blind_glove import BlindGlove, Nuisance
-from further_forms import every_form
+from further_forms import dealt_forms
 from glove_choices import (
     BITS,
     EVERY_RATE_HZ,
@@ -30,7 +30,7 @@ FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceili
 
 
 def open_forms(name: str) -> set[str]:
-    return {form.name for form in every_form(name) if not form.set_aside}
+    return {form.name for form in dealt_forms(name, set_aside=False)}
 
 
 def test_every_form_and_device_comes_in_turn() -> None:

@@ -1,7 +1,8 @@
 """Forms of causes that only the study hides, beside those of the product's own simulation.
 
-Those in ``retired`` were set aside once and have been read since; those in ``set_aside`` nobody has looked at
-while the diagnosis was built.
+Those in ``retired`` were set aside once and have been read since; those in ``asked_often`` were asked by many
+states of the diagnosis, and are hidden by name alone; those in ``set_aside`` nobody has looked at while the
+diagnosis was built.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from glovecal_models.simulation.causes.form import Form
 
 def every_form(name: str) -> tuple[Form, ...]:
     """The forms of one cause, those set aside last. Raises BadInput for another name."""
-    further = (_in(folder, name) for folder in ("retired", "set_aside", "set_aside.unlike"))
-    return (*forms(name), *(form for found in further for form in found))
+    by_name = tuple(form for folder in ("asked_often", "asked_often.unlike") for form in _in(folder, name))
+    return (*forms(name), *_in("retired", name), *by_name, *_in("set_aside", name))
 
 
-def unlike_open_forms(name: str) -> frozenset[str]:
-    """Names of the forms set aside whose author knew the laws of all others and had to find other ones."""
-    return frozenset(form.name for form in _in("set_aside.unlike", name))
+def dealt_forms(name: str, *, set_aside: bool) -> tuple[Form, ...]:
+    """Those that the study hides in turn. Raises BadInput for another name."""
+    return _in("set_aside", name) if set_aside else (*forms(name), *_in("retired", name))
 
 
 def _in(folder: str, name: str) -> tuple[Form, ...]:

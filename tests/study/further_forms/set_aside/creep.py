@@ -1,70 +1,70 @@
-"""Creep: the material relaxes over seconds to a minute after it is bent."""
+"""Set-aside forms of creep."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-def _slow(values: np.ndarray, time_s: float | np.ndarray, rate_hz: float) -> np.ndarray:
-    """``values`` (T, N, S) followed with a time constant for each sensor, at rest before the first frame."""
-    keep = np.exp(-1.0 / (np.broadcast_to(time_s, values.shape[2:]) * rate_hz))
-    followed = np.empty_like(values)
-    for sensor, kept in enumerate(keep):
-        first = values[:, :1, sensor]
-        part = lfilter([1 - kept], [1.0, -kept], values[:, :, sensor] - first, axis=1)
-        followed[:, :, sensor] = first + part
-    return followed
+@form(
+    Stage.MECHANICAL,
+    "Chains of a polymer backing hop over barriers, so that the flow grows with the hyperbolic sine "
+    "of the load (Eyring 1936; Halsey, White and Eyring 1945 for textiles).",
+    set_aside=True,
+)
+def eyring_flow_of_cloth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Large steps flow fast at first, the last degrees take long."""
+    tau, per_deg = draws.each("tau_s", 8.0, 20.0), draws.each("per_deg", 0.05, 0.12)
+    flowed = np.empty_like(signal)
+    state = signal[:, 0].copy()
+    for n in range(signal.shape[1]):
+        load = np.clip(per_deg * (signal[:, n] - state), -3.0, 3.0)
+        state += np.sinh(load) / (per_deg * tau * scene.rate_hz)
+        flowed[:, n] = state
+    return signal + size * (flowed - signal) / 8.0
 
 
 @form(
     Stage.MECHANICAL,
-    "A spring beside a spring with a damper: it relaxes with one time constant (standard linear solid).",
+    "Crimped yarns straighten within seconds while the joint stays well bent, and crimp again more "
+    "slowly once it opens (elastic recovery of fabrics, Morton and Hearle 2008).",
     set_aside=True,
 )
-def single_relaxation(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """After a bend the reading droops, and after straightening it comes back from below."""
-    share = (signal - scene.low) / scene.span
-    return signal - size * _slow(share, draws.each("time_s", 4.0, 20.0), scene.rate_hz)
+def crimp_straightens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Only beyond some bend, with different times for both ways."""
+    onset = draws.each("onset", 0.05, 0.25)
+    straightens, recovers = draws.each("straightens_s", 3.0, 7.0), draws.each("recovers_s", 9.0, 20.0)
+    aim = 25.0 * np.maximum((signal - scene.low) / scene.span - onset, 0.0) ** 1.5
+    crept = np.empty_like(signal)
+    state = 0.5 * aim.mean(axis=1)
+    for n in range(signal.shape[1]):
+        gap = aim[:, n] - state
+        state = state + gap / (np.where(gap > 0, straightens, recovers) * scene.rate_hz)
+        crept[:, n] = state
+    return signal + size * crept / 2.0
 
 
 @form(
     Stage.MECHANICAL,
-    "Polymer that relaxes evenly in the logarithm of time, 1 to 50 s (Prony series of a power law, Findley).",
+    "Air and moisture are squeezed out of the padding below the strip by diffusion, first with the "
+    "root of time (consolidation, Terzaghi 1925; Biot 1941).",
     set_aside=True,
 )
-def logarithmic_relaxation(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Four time constants, three or four times apart, of about equal weight."""
-    share = (signal - scene.low) / scene.span
-    shortest, exponent = draws.one("shortest_s", 0.8, 1.5), draws.each("exponent", -0.1, 0.25)
-    relaxed, total = np.zeros_like(share), np.zeros_like(exponent)
-    for step in range(4):
-        weight = np.exp(exponent * step)
-        relaxed += weight * _slow(share, shortest * 3.3**step, scene.rate_hz)
-        total += weight
-    return signal - size * relaxed / total
+def padding_squeezed_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Five modes of diffusion; the padding gives way, so the reading drifts back."""
+    tau = draws.each("tau_s", 8.0, 22.0)
+    odd = 2.0 * np.arange(5) + 1.0
+    weight = 1.0 / odd**2
+    weight /= weight.sum()
+    share = -np.expm1(-(odd**2) / (tau[:, None] * scene.rate_hz))
+    drained = np.empty_like(signal)
+    state = np.repeat(signal[:, 0, :, None], 5, axis=2)
+    for n in range(signal.shape[1]):
+        state += share * (signal[:, n, :, None] - state)
+        drained[:, n] = state @ weight
+    return signal - size * drained / 8.0
 
 
-@form(
-    Stage.MECHANICAL,
-    "Textile lengthens while the joint is bent far, and recovers more slowly than it gave way (ours).",
-    set_aside=True,
-)
-def slowly_recovering_textile(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Lengthening goes to the square of the bend, quickly upwards and slowly downwards."""
-    load = np.clip((signal - scene.low) / scene.span, 0.0, 1.2) ** 2
-    giving = draws.each("giving_s", 3.0, 10.0)
-    returning = giving * draws.each("times_slower", 2.0, 4.0)
-    quick, slow = (1 - np.exp(-1.0 / (time_s * scene.rate_hz)) for time_s in (giving, returning))
-    longer, now = np.empty_like(load), load[:, 0]
-    for frame in range(load.shape[1]):
-        gap = load[:, frame] - now
-        now = now + np.where(gap > 0, quick, slow) * gap
-        longer[:, frame] = now
-    return signal - size * longer
-
-
-FORMS = (single_relaxation, logarithmic_relaxation, slowly_recovering_textile)
+FORMS: tuple[Form, ...] = (eyring_flow_of_cloth, crimp_straightens, padding_squeezed_out)

@@ -1,55 +1,66 @@
-"""Donning shift: each wearing sits differently and stays as it is until the glove is taken off."""
+"""Set-aside forms of donning shift."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
 def _per_wearing(scene: Scene, draws: Draws, name: str, count: int) -> np.ndarray:
-    """``count`` normal numbers for each wearing, shape (T, 1, count)."""
-    drawn = [draws.stream(name, start.wearing).standard_normal(count) for start in scene.starts]
-    return np.array(drawn)[:, None, :]
+    """Values that are the same in all takes of one wearing, shape (T, 1, count)."""
+    return np.stack([draws.stream(name, start.wearing).standard_normal((1, count)) for start in scene.starts])
 
 
 @form(
     Stage.WEARING,
-    "Every sensor lies a little differently over its joint: an offset of its own per wearing (ours).",
+    "The glove is pushed onto the fingers to another depth each time, so that all strips lie away "
+    "from their joints by one common length (repeatability studies, Dipietro, Sabatini and Dario "
+    "2008).",
     set_aside=True,
 )
-def seat_offsets(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Independent from sensor to sensor and from wearing to wearing."""
-    return signal + size * _per_wearing(scene, draws, "seat", signal.shape[2])
+def pushed_on_to_another_depth(
+    signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
+) -> np.ndarray:
+    """One depth for each wearing; an offset and a belly in proportion to it."""
+    depth = _per_wearing(scene, draws, "depth", 1)
+    bent = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
+    shape = draws.signs() * draws.each("offset", 0.8, 1.2) + draws.each("belly", -1.5, 1.5) * np.sin(
+        np.pi * bent
+    )
+    return signal + size * 1.5 * depth * shape
 
 
 @form(
     Stage.WEARING,
-    "The sensors lie higher or lower over the joints: another lever, so another gain and zero (ours).",
+    "Each glove finger sits twisted about the finger by an angle of its own, so that a strip beside "
+    "the back sees the cosine of the bend's plane (misalignment, Kessler, Hodges and Walker 1995).",
     set_aside=True,
 )
-def seat_levers(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Mostly a gain about the lowest angle, with a smaller offset."""
-    share = (signal - scene.low) / scene.span
-    zero = draws.one("zero_share", 0.15, 0.4)
-    gains = _per_wearing(scene, draws, "lever", signal.shape[2])
-    return signal + size * (gains * share + zero * _per_wearing(scene, draws, "zero", signal.shape[2]))
+def finger_sits_twisted(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A stretch that is smaller the more the finger is twisted, and a shift to the side of the twist."""
+    fingers = sorted({name.split("_")[0] for name in scene.sensors})
+    column = [fingers.index(name.split("_")[0]) for name in scene.sensors]
+    usual = draws.each("usual_rad", -0.4, 0.4)
+    twist = usual + 0.4 * _per_wearing(scene, draws, "twist", len(fingers))[:, :, column]
+    aside = 3.0 * draws.each("aside", 0.3, 1.0) * (np.sin(twist) - np.sin(usual))
+    return signal + size * (aside + 0.4 * (np.cos(twist) - np.cos(usual)) * (signal + 10.0))
 
 
 @form(
     Stage.WEARING,
-    "How far the hand went in and how the glove is turned: two numbers per wearing move all sensors (ours).",
+    "The wrist strap is closed more or less tightly and pre-stretches the back of the glove, which "
+    "shows with an open hand and is used up in a fist (Wise and others 1990).",
     set_aside=True,
 )
-def pulled_on_and_turned(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """All fingers go with the first; each has its part in the second; a bent finger draws the cloth taut."""
-    depth = draws.each("depth_part", 0.7, 1.3)
-    turn = draws.each("turn_part", -1.0, 1.0)
-    fading = draws.one("fading", 0.2, 0.6)
-    share = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
-    seat = _per_wearing(scene, draws, "seat", 2)
-    return signal + size * (seat[:, :, :1] * depth + seat[:, :, 1:] * turn) * (1 - fading * share)
+def strap_tightness(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """One tightness for each wearing; an offset that fades with the bend."""
+    tightness = _per_wearing(scene, draws, "tightness", 1)
+    bent = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
+    return signal + size * 2.5 * draws.each("felt", 0.6, 1.4) * tightness * (1.0 - bent) ** draws.each(
+        "fades", 0.7, 2.0
+    )
 
 
-FORMS = (seat_offsets, seat_levers, pulled_on_and_turned)
+FORMS: tuple[Form, ...] = (pushed_on_to_another_depth, finger_sits_twisted, strap_tightness)

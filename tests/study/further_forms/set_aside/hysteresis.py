@@ -1,69 +1,71 @@
-"""Hysteresis: the reading depends on the path by which the angle was reached, however fast."""
+"""Set-aside forms of hysteresis."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-def _play(share: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """What is dragged along with ``share`` (T, N, S) with free travel ``radius`` (S,) to both sides."""
-    dragged = np.empty_like(share)
-    now = share[:, 0]
-    for frame in range(share.shape[1]):
-        now = np.clip(now, share[:, frame] - radius, share[:, frame] + radius)
-        dragged[:, frame] = now
-    return dragged
+@form(
+    Stage.MECHANICAL,
+    "A strip sliding in a curved sleeve is held by friction that grows exponentially with the wrapped"
+    " angle (capstan equation, Euler 1769).",
+    set_aside=True,
+)
+def capstan_sleeve(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Play whose width grows with the bend."""
+    friction = draws.each("friction", 0.5, 1.2)
+    width = draws.each("width_deg", 2.0, 4.0) * np.exp(friction * np.radians(np.clip(signal, -20.0, 120.0)))
+    held = np.empty_like(signal)
+    state = signal[:, 0].copy()
+    for n in range(signal.shape[1]):
+        state = np.clip(state, signal[:, n] - width[:, n], signal[:, n] + width[:, n])
+        held[:, n] = state
+    return signal + size * (held - signal) / 5.0
 
 
 @form(
     Stage.MECHANICAL,
-    "The sensor has free travel in its pocket and follows once that is used up (play operator, backlash).",
+    "A few folds of the cloth snap over at one angle and back at another, each by itself (coarse "
+    "relays after Preisach 1935).",
     set_aside=True,
 )
-def loose_pocket_backlash(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One play of a width of its own for each sensor."""
-    share = (signal - scene.low) / scene.span
-    radius = draws.each("radius", 0.03, 0.08)
-    return signal + size * (_play(share, radius) - share) / radius
+def snapping_folds(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Four relays of different place, width and weight for each sensor."""
+    bent = (signal - scene.low) / scene.span
+    steps = np.zeros_like(signal)
+    for fold in range(4):
+        centre = draws.each(f"centre_{fold}", 0.1 + 0.15 * fold, 0.25 + 0.15 * fold)
+        half = draws.each(f"half_{fold}", 0.04, 0.16)
+        weight = draws.each(f"weight_{fold}", 0.5, 1.5)
+        event = (bent > centre + half).astype(int) - (bent < centre - half).astype(int)
+        last = np.maximum.accumulate(np.where(event != 0, np.arange(bent.shape[1])[:, None], 0), axis=1)
+        state = np.take_along_axis(event, last, axis=1)
+        steps += weight * np.where(state == 0, -1, state)
+    return signal - size * steps
 
 
 @form(
     Stage.MECHANICAL,
-    "Friction of the sleeve on the sensor that builds up over a short way after each turn (Dahl 1968).",
+    "The memory of a woven strip fades with the path travelled, sooner while bending than while "
+    "opening (Coleman and Hodgdon 1986).",
     set_aside=True,
 )
-def sleeve_friction(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Friction goes towards -1 or 1, in the direction of the motion, exponentially along the way."""
-    way = np.zeros_like(signal)
-    way[:, 1:] = np.diff(signal, axis=1) / scene.span
-    forget = np.exp(-np.abs(way) / draws.each("way", 0.04, 0.15))
-    towards = np.sign(way) * (1 - forget)
-    friction = np.zeros_like(signal)
-    now = np.zeros_like(signal[:, 0])
-    for frame in range(signal.shape[1]):
-        now = forget[:, frame] * now + towards[:, frame]
-        friction[:, frame] = now
-    return signal - size * friction
+def path_forgets(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A follower in travelled degrees instead of seconds."""
+    bending, opening = draws.each("bending_deg", 6.0, 14.0), draws.each("opening_deg", 14.0, 35.0)
+    followed = np.empty_like(signal)
+    state = signal[:, 0].copy()
+    before = signal[:, 0]
+    for n in range(signal.shape[1]):
+        step = signal[:, n] - before
+        share = -np.expm1(-np.where(step > 0, step / bending, -step / opening))
+        state += share * (signal[:, n] - state)
+        followed[:, n] = state
+        before = signal[:, n]
+    return signal + size * (followed - signal) / 6.0
 
 
-@form(
-    Stage.MECHANICAL,
-    "Rubbing yarns of a knit: many plays in parallel, loops grow with the move (Prandtl-Ishlinskii).",
-    set_aside=True,
-)
-def rubbing_yarns(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Plays of many widths, the narrow ones weighing more or less for each sensor."""
-    share = (signal - scene.low) / scene.span
-    widest, fall = draws.each("widest", 0.25, 0.45), draws.each("fall", 0.0, 1.5)
-    lagging, total = np.zeros_like(share), np.zeros_like(widest)
-    for part in (np.arange(8) + 0.5) / 8:
-        weight = np.exp(-fall * part)
-        lagging += weight * (_play(share, widest * part) - share)
-        total += weight
-    return signal + size * lagging / total
-
-
-FORMS = (loose_pocket_backlash, sleeve_friction, rubbing_yarns)
+FORMS: tuple[Form, ...] = (capstan_sleeve, snapping_folds, path_forgets)

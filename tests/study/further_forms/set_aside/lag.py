@@ -1,70 +1,85 @@
-"""Lag: each sensor comes after its joint by a short memory of its own."""
+"""Set-aside forms of lag."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-def _follow(values: np.ndarray, time_s: float, rate_hz: float) -> np.ndarray:
-    """First-order low pass of ``values`` (T, N), exact for straight lines between frames."""
-    keep = np.exp(-1.0 / (time_s * rate_hz))
-    middle = (1 - keep) * time_s * rate_hz
-    first = values[:, :1]
-    return np.asarray(first + lfilter([1 - middle, middle - keep], [1.0, -keep], values - first, axis=1))
+def _running_mean(values: np.ndarray, width: float) -> np.ndarray:
+    """Mean over the last ``width`` samples (any positive number) of straight lines between values (T, N)."""
+    padded = np.pad(values, ((0, 0), (int(width) + 2, 0)), mode="edge")
+    area = np.pad(np.cumsum(0.5 * (padded[:, 1:] + padded[:, :-1]), axis=1), ((0, 0), (1, 0)))
+    now = np.arange(padded.shape[1] - values.shape[1], padded.shape[1])
+    cell = np.floor(now - width).astype(int)
+    part = (now - width) - cell
+    first, second = padded[:, cell], padded[:, cell + 1]
+    before = area[:, cell] + part * first + 0.5 * part**2 * (second - first)
+    return (area[:, now] - before) / width
+
+
+@form(
+    Stage.MECHANICAL,
+    "Muscles bend the strip at once but only its own spring straightens it, slowly in a tight sleeve "
+    "(recovery time in bend sensor data sheets).",
+    set_aside=True,
+    sizes=(0.001, 0.6),
+)
+def slow_recoil(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A short time constant while bending, a long one while opening; size in seconds."""
+    quick = draws.each("quick_share", 0.05, 0.2)
+    opening = np.maximum(size, 1e-6)
+    closing = opening * quick
+    share_open, share_close = (
+        -np.expm1(-1.0 / (scene.rate_hz * opening)),
+        -np.expm1(-1.0 / (scene.rate_hz * closing)),
+    )
+    followed = np.empty_like(signal)
+    state = signal[:, 0].copy()
+    for n in range(signal.shape[1]):
+        gap = signal[:, n] - state
+        state += np.where(gap > 0, share_close, share_open) * gap
+        followed[:, n] = state
+    return followed
 
 
 @form(
     Stage.ELECTRICAL,
-    "One resistor and capacitor before the converter's input, or soft rubber: a first-order low pass.",
+    "A piezoresistive strip of megohms charges its cable and input filter, with a time that grows as "
+    "its resistance does with the bend (RC input, Horowitz and Hill 2015).",
     set_aside=True,
-    sizes=(0.002, 0.8),
+    sizes=(0.001, 0.4),
 )
-def input_capacitor(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Size is the time constant in seconds."""
-    followed = [_follow(signal[:, :, k], float(size[k]), scene.rate_hz) for k in range(signal.shape[2])]
-    return np.stack(followed, axis=2)
+def charging_grows_with_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """First order; the time constant is much longer for a bent strip; size in seconds."""
+    grows = draws.each("grows", 1.0, 4.0)
+    bent = np.clip((signal - scene.low) / scene.span, 0.0, 1.2)
+    share = -np.expm1(-1.0 / (scene.rate_hz * np.maximum(size, 1e-6) * (0.4 + grows * bent)))
+    followed = np.empty_like(signal)
+    state = signal[:, 0].copy()
+    for n in range(signal.shape[1]):
+        state += share[:, n] * (signal[:, n] - state)
+        followed[:, n] = state
+    return followed
 
 
 @form(
     Stage.ELECTRICAL,
-    "Soft padding and a filter one after the other: a second-order low pass without overshoot (ours).",
+    "A sigma-delta converter for each sensor averages three times over its conversion time (sinc "
+    "filter, Hogenauer 1981; capacitance converter data sheets).",
     set_aside=True,
-    sizes=(0.002, 0.8),
+    sizes=(0.001, 0.4),
 )
-def padding_and_filter(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Size is the sum of both time constants in seconds."""
-    part = draws.each("first_share", 0.5, 0.7)
-    stages = []
-    for k in range(signal.shape[2]):
-        padded = _follow(signal[:, :, k], float(size[k] * part[k]), scene.rate_hz)
-        stages.append(_follow(padded, float(size[k] * (1 - part[k])), scene.rate_hz))
-    return np.stack(stages, axis=2)
+def sinc_converter(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Three running means in a row over the size in seconds; the chips' times differ a little."""
+    window = size * draws.each("window", 0.7, 1.3)
+    smooth = signal.copy()
+    for column in np.flatnonzero(window > 1e-5):
+        for _ in range(3):
+            smooth[:, :, column] = _running_mean(smooth[:, :, column], window[column] * scene.rate_hz)
+    return smooth
 
 
-@form(
-    Stage.ELECTRICAL,
-    "Elastic springs back less readily than it is pulled: a low pass, slower when straightening (ours).",
-    set_aside=True,
-    sizes=(0.002, 0.8),
-)
-def slower_springing_back(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Size is the time constant of straightening in seconds; that of bending is a share of it."""
-    bending = size * draws.each("bending_share", 0.3, 0.6)
-    steps = 4
-    down, up = (1 - np.exp(-1.0 / (time_s * scene.rate_hz * steps)) for time_s in (size, bending))
-    late, now = np.empty_like(signal), signal[:, 0]
-    before = signal[:, 0]
-    for frame in range(signal.shape[1]):
-        for step in range(1, steps + 1):
-            gap = before + (signal[:, frame] - before) * (step / steps) - now
-            now = now + np.where(gap > 0, up, down) * gap
-        before = signal[:, frame]
-        late[:, frame] = now
-    return late
-
-
-FORMS = (input_capacitor, padding_and_filter, slower_springing_back)
+FORMS: tuple[Form, ...] = (slow_recoil, charging_grows_with_bend, sinc_converter)

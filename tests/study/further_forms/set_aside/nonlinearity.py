@@ -1,57 +1,58 @@
-"""Nonlinearity: the reading is a curved function of the sensor's own angle, always the same."""
+"""Set-aside forms of nonlinearity."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
 def _share(signal: np.ndarray, scene: Scene) -> np.ndarray:
-    """The sensor's angle as a share of its range, a little beyond both ends at most."""
-    return np.clip((signal - scene.low) / scene.span, -0.3, 1.3)
+    """The signal as a share of each sensor's range."""
+    return (signal - scene.low) / scene.span
 
 
 @form(
     Stage.ELECTRICAL,
-    "Resistance of a carbon-ink bend sensor that grows ever faster with bending, exponentially (ours).",
+    "Macrobend loss of an optical fibre sets in exponentially with curvature (Marcuse 1976).",
     set_aside=True,
     judged_by="straight_line",
 )
-def ink_resistance_growth(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """An exponential through both ends of the range, less the straight line."""
-    rate = draws.each("growth", 1.0, 2.5)
-    share = _share(signal, scene)
-    return signal + size * (np.expm1(rate * share) / np.expm1(rate) - share)
+def fibre_loss_onset(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Hardly anything at first, then ever more."""
+    steepness = draws.each("steepness", 2.0, 4.5)
+    bent = np.clip(_share(signal, scene), -0.5, 1.5)
+    return signal + size * draws.signs() * 4.0 * np.expm1(steepness * bent) / np.expm1(steepness)
 
 
 @form(
     Stage.ELECTRICAL,
-    "Voltage divider: the output flattens as the sensor outgrows its resistor (Ohm's law, R / (R + R0)).",
+    "A rotary Hall sensor whose magnet sits off its axis errs with the second harmonic of the angle "
+    "(magnetic position sensor data sheets, section on displacement).",
     set_aside=True,
     judged_by="straight_line",
 )
-def divider_flattening(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A hyperbola through both ends of the range, less the straight line."""
-    ratio = draws.each("ratio", 0.6, 2.0)
-    share = _share(signal, scene)
-    return signal + size * ((1 + ratio) * share / (1 + ratio * share) - share)
+def off_axis_magnet(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Two harmonics of the mechanical angle; the magnet turns by some 90 to 180 degrees over the range."""
+    first, second = draws.each("first_rad", 0.0, 2 * np.pi), draws.each("second_rad", 0.0, 2 * np.pi)
+    gear = draws.each("gear_rad", 1.5, 3.2)
+    turn = gear * _share(signal, scene)
+    return signal + size * (0.6 * np.sin(turn + first) + 1.4 * np.sin(2 * turn + second))
 
 
 @form(
     Stage.ELECTRICAL,
-    "S-shape: a sensor answers most where the crease of the joint lies under its middle (ours).",
+    "A knitted strain gauge has two slopes: loops open their contacts up to a knee, then the yarn "
+    "itself stretches (Zhang and others 2006).",
     set_aside=True,
     judged_by="straight_line",
 )
-def sensitive_middle(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A smooth step about the steepest place, less the straight line between its ends."""
-    middle = draws.each("middle", 0.4, 0.6)
-    steepness = draws.each("steepness", 1.6, 2.6)
-    share = _share(signal, scene)
-    start, end = np.tanh(-steepness * middle), np.tanh(steepness * (1 - middle))
-    return signal + size * ((np.tanh(steepness * (share - middle)) - start) / (end - start) - share)
+def knit_knee(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A rounded kink somewhere in the range."""
+    knee, width = draws.each("knee", 0.25, 0.65), draws.each("width", 0.02, 0.08)
+    beyond = width * np.logaddexp(0.0, (_share(signal, scene) - knee) / width)
+    return signal + size * draws.signs() * 8.0 * beyond
 
 
-FORMS = (ink_resistance_growth, divider_flattening, sensitive_middle)
+FORMS: tuple[Form, ...] = (fibre_loss_onset, off_axis_magnet, knit_knee)

@@ -1,55 +1,57 @@
-"""Saturation: at an end of its range the reading hardly changes any more."""
+"""Set-aside forms of saturation."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
 @form(
-    Stage.CONVERTER,
-    "The amplified signal exceeds the converter's full scale: every larger bend gives the highest count.",
+    Stage.COUNTS,
+    "An amplifier without a negative supply stops some millivolts above ground, so the most open part"
+    " of the range is cut (output swing of single-supply amplifiers, data sheets).",
     set_aside=True,
-    touches="two",
     judged_by="lost_angle",
-    sizes=(0.02, 1.6),
+    sizes=(1.0, 90.0),
 )
-def converter_full_scale(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A hard stop; size is the share of the range above it."""
-    return np.minimum(signal, scene.high - size * scene.span)
+def rail_at_open_hand(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Everything below a level reads the same; the size is how far the level is above the lowest angle."""
+    round_deg = draws.each("round_deg", 0.3, 1.2)
+    level = scene.low + size - 5.0
+    return level + round_deg * np.logaddexp(0.0, (signal - level) / round_deg)
 
 
 @form(
     Stage.COUNTS,
-    "An amplifier nears its rail, or a stretched sensor its limit: the reading levels off (ours).",
+    "A worn track of a joint potentiometer has a stretch where the wiper runs on bare conductor and "
+    "nothing changes (wear of conductive plastic potentiometers, Todd 1975).",
     set_aside=True,
-    touches="two",
     judged_by="lost_angle",
-    sizes=(0.02, 1.6),
+    sizes=(1.0, 90.0),
 )
-def levelling_off_bent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A rounded knee with hardly any slope left above it; size is the share of the range above the knee."""
-    width = draws.each("rounding", 0.02, 0.05) * scene.span
-    over = width * np.logaddexp(0.0, (signal - (scene.high - size * scene.span)) / width)
-    return signal - over
+def worn_stretch_of_track(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A plateau inside the range, as wide as the size; both sides stay where they were."""
+    place = scene.low + scene.span * draws.each("place", 0.25, 0.45)
+    start, end = place - 0.5 * size, place + 0.5 * size
+    reads = start + size * draws.each("reads", 0.2, 0.8)
+    return np.where((signal > start) & (signal < end), reads, signal)
 
 
 @form(
     Stage.COUNTS,
-    "A loose sensor buckles when the finger is nearly straight: it starts only once it is taut (ours).",
+    "A fibre bent far has lost nearly all of its light, and each further degree takes only a share of"
+    " what is left (Marcuse 1976; optical bend sensors, Fujiwara and others 2014).",
     set_aside=True,
-    touches="two",
     judged_by="lost_angle",
-    sizes=(0.02, 1.6),
+    sizes=(1.0, 110.0),
 )
-def slack_when_straight(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """The lowest share of the range gives hardly any change; size is that share."""
-    left = draws.each("slope_left", 0.0, 0.01)
-    width = 0.015 * scene.span
-    under = width * np.logaddexp(0.0, (scene.low + size * scene.span - signal) / width)
-    return signal + (1 - left) * under
+def light_runs_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Beyond a knee the response fades; the size is how far the knee is below the highest angle."""
+    fades = draws.each("fades_deg", 1.0, 4.0)
+    over = np.maximum(signal - (scene.high + 5.0 - size), 0.0)
+    return signal - over - fades * np.expm1(-over / fades)
 
 
-FORMS = (converter_full_scale, levelling_off_bent, slack_when_straight)
+FORMS: tuple[Form, ...] = (rail_at_open_hand, worn_stretch_of_track, light_runs_out)

@@ -1,50 +1,62 @@
-"""Supply sag: readings depend on the recorded supply voltage."""
+"""Set-aside forms of supply sag."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
-USUAL_V = 3.8
+
+def _shrunk(signal: np.ndarray, scene: Scene, size: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """The voltage behind each reading less the share ``size * missing``, (T, N) for all sensors."""
+    return signal - size * missing[:, :, None] * (scene.counts_zero_deg + signal)
 
 
 @form(
     Stage.COUNTS,
-    "Sensor dividers hang on the battery, the converter has a fixed reference: counts go with the volts.",
+    "A linear regulator leaves regulation when the battery comes near its output plus dropout, and "
+    "from then on follows it down (dropout curves in regulator data sheets).",
     set_aside=True,
     shared=True,
-    sizes=(0.003, 20.0),
 )
-def dividers_on_battery(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Size 1: the voltage behind a reading is in proportion to the supply."""
-    gain = size * (scene.supply_v[:, :, None] / USUAL_V - 1)
-    return signal + gain * (signal + scene.counts_zero_deg)
-
-
-@form(
-    Stage.ELECTRICAL,
-    "Finite supply rejection of amplifiers: each zero moves in proportion to supply (data sheets, PSRR).",
-    set_aside=True,
-)
-def poor_supply_rejection(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """So many degrees per volt, in a direction of its own for each sensor."""
-    return signal + size * draws.signs() * (scene.supply_v[:, :, None] - USUAL_V) * 5.0
+def regulator_below_dropout(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Nothing above a voltage, volt for volt below it."""
+    dropout, width = draws.one("dropout_v", 4.03, 4.12), draws.one("width_v", 0.015, 0.04)
+    missing = width * np.logaddexp(0.0, (dropout - scene.supply_v) / width)
+    return _shrunk(signal, scene, size, missing)
 
 
 @form(
     Stage.COUNTS,
-    "The regulator drops out when the battery is low: below a knee excitation falls with it (LDO).",
+    "The radio's bursts draw current through the cell's inner resistance, which grows as the cell "
+    "empties, so the sag comes in pulses (lithium cell models, Chen and Rincon-Mora 2006).",
     set_aside=True,
     shared=True,
-    sizes=(0.003, 20.0),
 )
-def regulator_drops_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Size 1: below the knee the excitation falls as the supply does; the knee is rounded."""
-    knee_v, rounding_v = draws.one("knee_v", 3.9, 4.05), 0.06
-    missing_v = rounding_v * np.logaddexp(0.0, (knee_v - scene.supply_v[:, :, None]) / rounding_v)
-    return signal - size * missing_v / knee_v * (signal + scene.counts_zero_deg)
+def sags_under_radio_bursts(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A steady part and a pulsed part, both larger at lower voltage."""
+    every, lasts, phase = (
+        draws.one("every_s", 0.8, 3.0),
+        draws.one("lasts", 0.2, 0.5),
+        draws.one("phase", 0.0, 1.0),
+    )
+    pulsed = ((scene.session_s / every + phase) % 1.0 < lasts) * draws.one("pulse", 0.3, 1.0)
+    return _shrunk(signal, scene, size, np.maximum(4.2 - scene.supply_v, 0.0) ** 1.5 * (1.0 + pulsed))
 
 
-FORMS = (dividers_on_battery, poor_supply_rejection, regulator_drops_out)
+@form(
+    Stage.COUNTS,
+    "The lamp of a fibre glove is fed through a resistor, so its light falls with what the supply has"
+    " above the forward voltage, raised to a power (LED data sheets; Zimmerman's optical glove 1985).",
+    set_aside=True,
+    shared=True,
+)
+def lamp_fed_by_resistor(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """All readings follow the light."""
+    forward, power = draws.one("forward_v", 1.8, 3.2), draws.one("power", 1.0, 1.6)
+    light = (np.maximum(scene.supply_v - forward, 0.05) / (4.2 - forward)) ** power
+    return _shrunk(signal, scene, size, 1.0 - light)
+
+
+FORMS: tuple[Form, ...] = (regulator_below_dropout, sags_under_radio_bursts, lamp_fed_by_resistor)

@@ -1,54 +1,53 @@
-"""Temperature: readings depend on the recorded temperature."""
+"""Set-aside forms of temperature."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-def _warmer(scene: Scene) -> np.ndarray:
-    """Degrees above the usual temperature of this session, shape (T, N, 1)."""
-    return scene.temperature_c[:, :, None] - scene.usual_air[0]
+@form(
+    Stage.ELECTRICAL,
+    "A compensated voltage reference is left with a parabola around its turning point (curvature of "
+    "bandgap references, Brokaw 1974).",
+    set_aside=True,
+)
+def bandgap_parabola(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """The same on both sides of a turning point near the usual warmth, on zero and span."""
+    turning = scene.usual_air[0] + draws.each("turning_c", -1.0, 1.0)
+    square = (scene.temperature_c[:, :, None] - turning) ** 2
+    return signal + size * draws.signs() * 0.4 * square * (0.5 + (signal - scene.low) / scene.span)
 
 
 @form(
     Stage.ELECTRICAL,
-    "Zero drift in proportion to temperature, as data sheets of sensors and amplifiers state it.",
+    "Carbon particles in a polymer part as the binder expands, so that the resistance climbs steeply "
+    "above some warmth (positive temperature coefficient of carbon composites, Kohler 1966; Ohe and "
+    "Naito 1971).",
     set_aside=True,
 )
-def zero_temperature_drift(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """So many degrees of angle per degree of temperature."""
-    return signal + size * draws.signs() * _warmer(scene) / 5.0
+def binder_expands(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """Nothing when cool, ever more when warm."""
+    onset = scene.usual_air[0] + draws.each("onset_c", -1.5, 0.3)
+    width = draws.each("width_c", 0.2, 0.6)
+    above = width * np.logaddexp(0.0, (scene.temperature_c[:, :, None] - onset) / width)
+    return signal + size * 2.0 * above
 
 
 @form(
     Stage.ELECTRICAL,
-    "Thermal coefficient of sensitivity: gauge factor changes in proportion to temperature (data sheets).",
+    "A warm elastomer sleeve is softer and lets the strip bow away from the joint in the middle of "
+    "its travel (modulus of rubbers near their transition, Ferry 1980).",
     set_aside=True,
 )
-def sensitivity_temperature_drift(
-    signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
-) -> np.ndarray:
-    """A gain about the lowest angle; all sensors are of one material, so all go the same way."""
-    share = (signal - scene.low) / scene.span
-    return signal + size * draws.sign() * share * _warmer(scene) / 5.0
+def sleeve_softens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A belly of the curve that comes and goes with the warmth; both ends stay."""
+    warmth = scene.temperature_c[:, :, None] - scene.usual_air[0]
+    bent = np.clip((signal - scene.low) / scene.span, 0.0, 1.0)
+    softer = np.expm1(draws.each("per_c", 0.1, 0.25) * warmth)
+    return signal - size * 6.0 * softer * np.sin(np.pi * bent ** draws.each("skew", 0.6, 1.2))
 
 
-@form(
-    Stage.ELECTRICAL,
-    "Carbon-filled polymer conducts better when warm, exponentially (Arrhenius), at rest and more when bent.",
-    set_aside=True,
-)
-def thermally_activated_conduction(
-    signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
-) -> np.ndarray:
-    """The exponential acts on the whole resistance: that of the straight sensor and that due to bending."""
-    rate = draws.one("per_degree", 0.06, 0.14)
-    resting = draws.each("resting", 0.4, 1.0)
-    share = (signal - scene.low) / scene.span
-    return signal + size * draws.sign() * (resting + share) * np.expm1(rate * _warmer(scene))
-
-
-FORMS = (zero_temperature_drift, sensitivity_temperature_drift, thermally_activated_conduction)
+FORMS: tuple[Form, ...] = (bandgap_parabola, binder_expands, sleeve_softens)

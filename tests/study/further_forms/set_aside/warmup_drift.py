@@ -1,52 +1,53 @@
-"""Warm-up drift: readings drift with the time since power-on and settle."""
+"""Set-aside forms of warmup drift."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glovecal_models.simulation.causes.form import Draws, Stage, form
+from glovecal_models.simulation.causes.form import Draws, Form, Stage, form
 from glovecal_models.simulation.scene import Scene
 
 
-def _left(scene: Scene, time_s: np.ndarray) -> np.ndarray:
-    """The share of warming that is still to come, shape (T, N, S)."""
-    return np.exp(-np.maximum(scene.power_on_s, 0.0)[:, :, None] / time_s)
+@form(
+    Stage.ELECTRICAL,
+    "The amplifier warms before its reference resistor does, so the reading runs away and comes back "
+    "(two thermal masses; warm-up plots of precision amplifiers, Horowitz and Hill 2015).",
+    set_aside=True,
+)
+def amplifier_before_reference(
+    signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws
+) -> np.ndarray:
+    """A difference of two exponentials: a hump of minutes."""
+    quick, slow = draws.each("quick_s", 25.0, 60.0), draws.each("slow_s", 150.0, 400.0)
+    on = np.maximum(scene.power_on_s, 0.0)[:, :, None]
+    return signal + size * draws.signs() * 5.0 * (np.exp(-on / slow) - np.exp(-on / quick))
 
 
 @form(
     Stage.ELECTRICAL,
-    "The amplifier's zero settles exponentially as the electronics reach their temperature (Newton's law).",
+    "Charge soaks into the dielectric of the filter capacitors for minutes after power-on, with a "
+    "power of time (Curie 1889; von Schweidler 1907).",
     set_aside=True,
 )
-def settling_zero(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """One time constant for the board, a direction and a size for each sensor."""
-    time_s = np.full(signal.shape[2], draws.one("time_s", 120.0, 500.0))
-    return signal + size * draws.signs() * _left(scene, time_s)
+def dielectric_soaks(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A long tail without a time constant."""
+    power, begins = draws.each("power", 0.6, 1.1), draws.each("begins_s", 10.0, 40.0)
+    on = np.maximum(scene.power_on_s, 0.0)[:, :, None]
+    return signal + size * draws.signs() * 10.0 * (1.0 + on / begins) ** -power
 
 
 @form(
     Stage.ELECTRICAL,
-    "The amplification, or the sensors' excitation, settles exponentially: bent joints are off most (ours).",
+    "The light source of a fibre sensor loses brightness as its chip warms, and with it the span but "
+    "not the zero (thermal droop in LED data sheets).",
     set_aside=True,
 )
-def settling_gain(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """A gain about the lowest angle that is off at power-on, mostly in one direction for all."""
-    share = (signal - scene.low) / scene.span
-    time_s = np.full(signal.shape[2], draws.one("time_s", 120.0, 500.0))
-    return signal + size * draws.sign() * _left(scene, time_s) * share
+def lamp_droops(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
+    """A gain that falls with the square root of a warming exponential."""
+    tau = draws.each("tau_s", 90.0, 300.0)
+    on = np.maximum(scene.power_on_s, 0.0)[:, :, None]
+    warm = np.sqrt(-np.expm1(-on / tau))
+    return signal - size * 8.0 * warm * (signal - scene.low) / scene.span
 
 
-@form(
-    Stage.ELECTRICAL,
-    "The chip warms within a minute, its housing within a quarter of an hour: two time constants (ours).",
-    set_aside=True,
-)
-def chip_then_housing(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
-    """Quick and slow drift of the zero, in the same direction for each sensor."""
-    quick = draws.each("quick_share", 0.35, 0.65)
-    chip = _left(scene, draws.each("chip_s", 20.0, 60.0))
-    housing = _left(scene, draws.each("housing_s", 400.0, 1000.0))
-    return signal + size * draws.signs() * (quick * chip + (1 - quick) * housing)
-
-
-FORMS = (settling_zero, settling_gain, chip_then_housing)
+FORMS: tuple[Form, ...] = (amplifier_before_reference, dielectric_soaks, lamp_droops)

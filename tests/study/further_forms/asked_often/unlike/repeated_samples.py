@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.TRANSPORT,
     "Each sensor sends messages of its own on a busy bus, where low priorities wait (CAN, ISO 11898).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.005, 1.0),
 )
@@ -28,7 +28,7 @@ def low_priorities_wait(signal: np.ndarray, scene: Scene, size: np.ndarray, draw
 @form(
     Stage.TRANSPORT,
     "A radio may send only so long, while airtime saved at rest lasts (token bucket; ETSI EN 300 220).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.01, 0.8),
 )
@@ -50,7 +50,7 @@ def airtime_runs_out(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
 @form(
     Stage.TRANSPORT,
     "A program fetches the glove once per picture, which takes unevenly long (log-normal times; ours).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.005, 1.0),
 )

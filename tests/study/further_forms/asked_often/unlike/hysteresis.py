@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.MECHANICAL,
     "A weak magnet turns a film's magnetisation past its hard axis, with jumps (Stoner & Wohlfarth 1948).",
-    set_aside=True,
+    only_by_name=True,
 )
 def film_hangs_on_hard_axis(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The magnetisation rests in the nearest hollow of its energy; the joint is geared up two to one."""
@@ -29,7 +29,7 @@ def film_hangs_on_hard_axis(signal: np.ndarray, scene: Scene, size: np.ndarray, 
 @form(
     Stage.MECHANICAL,
     "The strip's end rests between two ribs of the knit until it is pulled over (Prandtl and Tomlinson).",
-    set_aside=True,
+    only_by_name=True,
 )
 def rests_between_ribs(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """It stays in its groove beyond half-way to the next, so grooves change elsewhere on the way back."""
@@ -46,7 +46,7 @@ def rests_between_ribs(signal: np.ndarray, scene: Scene, size: np.ndarray, draws
 @form(
     Stage.MECHANICAL,
     "Friction of the sleeve grows with its tension, which the hand's closing makes (Amontons 1699; ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def sleeve_tightens_with_fist(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A free travel that is wide in a closed hand and narrow in an open one."""

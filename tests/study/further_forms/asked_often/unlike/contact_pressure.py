@@ -13,7 +13,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.MECHANICAL,
     "A piezoelectric film gives charge when pressed or let go, and the charge leaks away (PVDF; Kawai 1969).",
-    set_aside=True,
+    only_by_name=True,
     column=contact_column,
 )
 def film_gives_charge_when_pressed(
@@ -29,7 +29,7 @@ def film_gives_charge_when_pressed(
 @form(
     Stage.MECHANICAL,
     "The grip's force falls to each sensor by its part in the bending of all: wrapped fingers carry (ours).",
-    set_aside=True,
+    only_by_name=True,
     column=contact_column,
 )
 def force_shared_out_by_bend(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -42,7 +42,7 @@ def force_shared_out_by_bend(signal: np.ndarray, scene: Scene, size: np.ndarray,
 @form(
     Stage.MECHANICAL,
     "Above a critical force the strip buckles aside, by the root of the force beyond it (Euler; pitchfork).",
-    set_aside=True,
+    only_by_name=True,
     column=contact_column,
 )
 def buckles_aside(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

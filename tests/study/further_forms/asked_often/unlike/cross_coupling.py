@@ -20,7 +20,7 @@ def _neighbours(scene: Scene, draws: Draws) -> np.ndarray:
 @form(
     Stage.MECHANICAL,
     "Three sensors in series hang on one voltage, and each gets its share of it (Kirchhoff's voltage law).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
 )
 def string_shares_voltage(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -34,7 +34,7 @@ def string_shares_voltage(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.MECHANICAL,
     "Skin between the fingers pulls, and stiffens exponentially as neighbours stretch it (Fung 1967).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
 )
 def skin_web_stiffens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -48,7 +48,7 @@ def skin_web_stiffens(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.MECHANICAL,
     "The neighbours' pull runs round the own knuckle, where friction uses it up (Euler and Eytelwein).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
 )
 def friction_uses_up_pull(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

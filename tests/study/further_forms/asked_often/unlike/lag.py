@@ -13,7 +13,7 @@ from glovecal_models.simulation.signals import at_times
 @form(
     Stage.ELECTRICAL,
     "Pressure runs through a tube, then fills a bellows: dead time and one pole (Ziegler & Nichols 1942).",
-    set_aside=True,
+    only_by_name=True,
     sizes=(0.002, 0.8),
 )
 def tube_and_bellows(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -32,7 +32,7 @@ def tube_and_bellows(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
 @form(
     Stage.ELECTRICAL,
     "A notch in each channel takes tremor of 8 to 11 Hz away and delays slower motion (notch filter).",
-    set_aside=True,
+    only_by_name=True,
     sizes=(0.002, 0.8),
 )
 def notch_against_tremor(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -52,7 +52,7 @@ def notch_against_tremor(signal: np.ndarray, scene: Scene, size: np.ndarray, dra
 @form(
     Stage.ELECTRICAL,
     "A gel couples the strip to the skin and thins when sheared: quick far away, slow near (Cross 1965).",
-    set_aside=True,
+    only_by_name=True,
     sizes=(0.002, 0.8),
 )
 def gel_thins_when_sheared(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

@@ -19,7 +19,7 @@ def _per_wearing(scene: Scene, draws: Draws, name: str, low: float, high: float)
 @form(
     Stage.WEARING,
     "From another bend in each wearing the fingertip reaches the glove's end and stretches it (ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def fingertip_reaches_end(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Nothing up to that bend, then in proportion."""
@@ -32,7 +32,7 @@ def fingertip_reaches_end(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.WEARING,
     "A strip with even ribs lies elsewhere along the finger per wearing: another phase of its ripple (ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def ribs_lie_elsewhere(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Two to four ribs pass over the knuckle from straight to bent."""
@@ -44,7 +44,7 @@ def ribs_lie_elsewhere(signal: np.ndarray, scene: Scene, size: np.ndarray, draws
 @form(
     Stage.WEARING,
     "Slack left per wearing arches the strip by the root of what bending has not taken up (shallow arch).",
-    set_aside=True,
+    only_by_name=True,
 )
 def slack_arches_the_strip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Steep just before the slack is used up, nothing then; how much an arch lifts depends on its place."""

@@ -12,7 +12,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.ELECTRICAL,
     "Fibres hold more water drying than wetting, however slowly (sorption hysteresis; Urquhart 1929).",
-    set_aside=True,
+    only_by_name=True,
 )
 def fibres_keep_water(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The water stays behind the humidity by a fixed width both ways; the state lasts from take to take."""
@@ -30,7 +30,7 @@ def fibres_keep_water(signal: np.ndarray, scene: Scene, size: np.ndarray, draws:
 @form(
     Stage.ELECTRICAL,
     "Padding swells with humidity and lifts the strip in mid-bend, where it spans the knuckle freely (ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def padding_swells_under_span(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """In proportion to humidity times a bow over the bend: both ends lie on bone."""
@@ -42,7 +42,7 @@ def padding_swells_under_span(signal: np.ndarray, scene: Scene, size: np.ndarray
 @form(
     Stage.ELECTRICAL,
     "Fibres warm while they take up water and cool while they dry (Cassie, King & Baxter 1940).",
-    set_aside=True,
+    only_by_name=True,
 )
 def heat_of_sorption(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """How far the humidity has left its own mean of the last one to three minutes behind."""

@@ -23,7 +23,7 @@ def _flow(signal: np.ndarray, per_frame: Callable[[np.ndarray, np.ndarray, int],
 @form(
     Stage.MECHANICAL,
     "The strip ages from donning on: its time to relax grows with a power of the time worn (Struik 1978).",
-    set_aside=True,
+    only_by_name=True,
 )
 def slower_with_age(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """One relaxation time, seconds after donning and most of a minute when worn long."""
@@ -37,7 +37,7 @@ def slower_with_age(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.MECHANICAL,
     "The rate of flow is a power of what is missing, so that the end comes ever more slowly (Norton 1929).",
-    set_aside=True,
+    only_by_name=True,
 )
 def flows_by_a_power(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Powers of two and a half to four; the time is that at 40 degrees missing."""
@@ -52,7 +52,7 @@ def flows_by_a_power(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
 @form(
     Stage.MECHANICAL,
     "Loops of a knit lock the more they have given: the rate falls exponentially (strain hardening).",
-    set_aside=True,
+    only_by_name=True,
 )
 def knit_locks_up(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A second or two when nothing has given, most of a minute when all has, both ways."""

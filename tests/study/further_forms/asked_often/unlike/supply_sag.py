@@ -13,7 +13,7 @@ FULL_V = 4.0
 @form(
     Stage.COUNTS,
     "A transistor feeds the sensors by the square of what is above its threshold (Shichman & Hodges 1968).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.003, 20.0),
 )
@@ -27,7 +27,7 @@ def current_by_the_square(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.ELECTRICAL,
     "An analogue switch conducts worse at low supply and high signal: one over what is left (CMOS 4051).",
-    set_aside=True,
+    only_by_name=True,
 )
 def switch_resistance_rises(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The switch's resistance loads the sensor, in proportion to the signal behind it."""
@@ -41,7 +41,7 @@ def switch_resistance_rises(signal: np.ndarray, scene: Scene, size: np.ndarray, 
 @form(
     Stage.ELECTRICAL,
     "A light-emitting diode serves as reference: its drop is a logarithm of the current (Shockley 1949).",
-    set_aside=True,
+    only_by_name=True,
 )
 def diode_as_reference(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Zero points move with the logarithm of what the battery has above the diode's drop."""

@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.ELECTRICAL,
     "A ceramic capacitor sets the gain and peaks at one temperature (diffuse peak; Uchino & Nomura 1982).",
-    set_aside=True,
+    only_by_name=True,
 )
 def ceramic_past_its_peak(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """A bell of temperature, some degrees wide, times the signal."""
@@ -24,7 +24,7 @@ def ceramic_past_its_peak(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.ELECTRICAL,
     "A clamped strip expands against friction and stays behind the temperature both ways (Coulomb; play).",
-    set_aside=True,
+    only_by_name=True,
 )
 def expands_against_friction(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Free travel of half a degree to a degree Celsius; the state lasts from take to take."""
@@ -42,7 +42,7 @@ def expands_against_friction(signal: np.ndarray, scene: Scene, size: np.ndarray,
 @form(
     Stage.ELECTRICAL,
     "Warmth changes the exponent of a fibre's loss in bends, as its index falls (Marcuse 1976; ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def fibre_loss_exponent(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """The loss is exponential in bend times index step, so warmth matters far more in deep bends."""

@@ -17,7 +17,7 @@ def _seen(signal: np.ndarray, scene: Scene, offset: np.ndarray) -> np.ndarray:
 @form(
     Stage.CLOCK,
     "A clock is slewed at one even rate towards what the last check found, and then holds (adjtime of BSD).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 1.2),
 )
@@ -38,7 +38,7 @@ def slewed_at_even_rate(signal: np.ndarray, scene: Scene, size: np.ndarray, draw
 @form(
     Stage.CLOCK,
     "Cameras locked to the mains keep its time, the sum of a wandering frequency (grid time deviation).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 1.2),
 )
@@ -56,7 +56,7 @@ def locked_to_mains(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.CLOCK,
     "An RC oscillator slows evenly as its battery empties: the offset is a parabola of time (ours).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 1.2),
 )

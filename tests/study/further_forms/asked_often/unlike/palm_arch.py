@@ -12,7 +12,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.MECHANICAL,
     "The palm's soft pad follows the arch within a second or two and takes the cloth along (Kelvin-Voigt).",
-    set_aside=True,
+    only_by_name=True,
     touches="palm",
 )
 def soft_pad_follows_late(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -26,7 +26,7 @@ def soft_pad_follows_late(signal: np.ndarray, scene: Scene, size: np.ndarray, dr
 @form(
     Stage.MECHANICAL,
     "Cloth across the hollow goes loose by the arch and sags by the root of the excess (shallow catenary).",
-    set_aside=True,
+    only_by_name=True,
     touches="palm",
 )
 def loose_cloth_sags(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -38,7 +38,7 @@ def loose_cloth_sags(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: 
 @form(
     Stage.MECHANICAL,
     "A stiff patch on the glove's back pops over at one arch and back at a lower one (bistable; ours).",
-    set_aside=True,
+    only_by_name=True,
     touches="palm",
 )
 def stiff_patch_pops(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

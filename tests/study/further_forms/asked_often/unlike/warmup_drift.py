@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.ELECTRICAL,
     "Charge trapped in an insulator settles after power-on by a stretched exponential (Kohlrausch 1854).",
-    set_aside=True,
+    only_by_name=True,
 )
 def trapped_charge_settles(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Quick at first and long not at an end, for traps of all depths."""
@@ -23,7 +23,7 @@ def trapped_charge_settles(signal: np.ndarray, scene: Scene, size: np.ndarray, d
 @form(
     Stage.ELECTRICAL,
     "Leakage doubles every 8 degrees while the chip warms: a double exponential (Gompertz; junctions).",
-    set_aside=True,
+    only_by_name=True,
 )
 def leakage_of_warming_chip(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Little at first, then a rise, then it settles with the chip."""
@@ -36,7 +36,7 @@ def leakage_of_warming_chip(signal: np.ndarray, scene: Scene, size: np.ndarray, 
 @form(
     Stage.ELECTRICAL,
     "A rectifying diode drops more while cold, which weak signals feel most: straight joints (ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def diode_drops_while_cold(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Exponential in the time since power-on, and exponential in the bend."""

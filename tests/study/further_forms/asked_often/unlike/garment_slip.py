@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.WEARING,
     "A finger's cloth sits in one of two creases and changes over at random (two-state Markov; ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def sits_in_two_creases(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each finger by itself, for a minute or two at a time."""
@@ -29,7 +29,7 @@ def sits_in_two_creases(signal: np.ndarray, scene: Scene, size: np.ndarray, draw
 @form(
     Stage.WEARING,
     "The glove works down evenly, and now and then its wearer pulls it up again: uneven saw teeth (ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def pulled_up_again(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """All sensors together, at moments of the wearer's own; each pull leaves another rest."""
@@ -49,7 +49,7 @@ def pulled_up_again(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: D
 @form(
     Stage.WEARING,
     "Folds of cloth pass at random to the neighbour: what one gains the other loses (conserved; ours).",
-    set_aside=True,
+    only_by_name=True,
 )
 def folds_pass_to_neighbour(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
     """Each fold stays where it has gone until another one passes."""

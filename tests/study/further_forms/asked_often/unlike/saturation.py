@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.COUNTS,
     "A soft-iron core saturates as the magnet comes near at high bends (function of Langevin 1905).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
     judged_by="lost_angle",
     sizes=(0.02, 1.6),
@@ -28,7 +28,7 @@ def core_saturates(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dr
 @form(
     Stage.CONVERTER,
     "Readings are cut at the range learned on putting on, which each wearing learns anew (ours).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
     judged_by="lost_angle",
     sizes=(0.02, 1.6),
@@ -46,7 +46,7 @@ def cut_at_learned_range(signal: np.ndarray, scene: Scene, size: np.ndarray, dra
 @form(
     Stage.COUNTS,
     "A diode detector answers weak signals by their square, so straight joints look alike (square law).",
-    set_aside=True,
+    only_by_name=True,
     touches="two",
     judged_by="lost_angle",
     sizes=(0.02, 1.6),

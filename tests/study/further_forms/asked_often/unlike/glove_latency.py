@@ -18,7 +18,7 @@ def _late(signal: np.ndarray, scene: Scene, delay: np.ndarray) -> np.ndarray:
 @form(
     Stage.TRANSPORT,
     "The host polls at nearly the glove's rate: the wait grows evenly and falls back (beat; ours).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 0.4),
 )
@@ -31,7 +31,7 @@ def polling_beats_with_frames(signal: np.ndarray, scene: Scene, size: np.ndarray
 @form(
     Stage.TRANSPORT,
     "A play-out buffer grows at once at each hiccup and shrinks again exponentially (Ramjee et al. 1994).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 0.4),
 )
@@ -50,7 +50,7 @@ def buffer_grows_at_hiccups(signal: np.ndarray, scene: Scene, size: np.ndarray, 
 @form(
     Stage.TRANSPORT,
     "Differences are packed into as few bytes as they need: moving hands take longer (delta coding).",
-    set_aside=True,
+    only_by_name=True,
     shared=True,
     sizes=(0.002, 0.4),
 )

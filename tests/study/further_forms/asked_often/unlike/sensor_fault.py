@@ -13,7 +13,7 @@ from glovecal_models.simulation.signals import lasting_noise
 @form(
     Stage.CONVERTER,
     "A poor line loses the low bits of the converter's word: readings come in coarse steps (quantisation).",
-    set_aside=True,
+    only_by_name=True,
     touches="one",
     sizes=(0.5, 60.0),
 )
@@ -28,7 +28,7 @@ def low_bits_lost(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Dra
 @form(
     Stage.CONVERTER,
     "A worn cable charges itself while the finger moves it: noise with the speed (triboelectric noise).",
-    set_aside=True,
+    only_by_name=True,
     touches="one",
 )
 def cable_noise_when_moved(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -44,7 +44,7 @@ def cable_noise_when_moved(signal: np.ndarray, scene: Scene, size: np.ndarray, d
 @form(
     Stage.CONVERTER,
     "The sensor's chip restarts at random and takes part of the bend for its zero (touch-sensor baseline).",
-    set_aside=True,
+    only_by_name=True,
     touches="one",
 )
 def sets_its_zero_anew(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

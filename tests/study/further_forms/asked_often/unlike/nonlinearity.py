@@ -11,7 +11,7 @@ from glovecal_models.simulation.scene import Scene
 @form(
     Stage.ELECTRICAL,
     "A straight shutter uncovers a round window before a photocell: area of a circle's segment (geometry).",
-    set_aside=True,
+    only_by_name=True,
     judged_by="straight_line",
 )
 def shutter_over_round_window(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -30,7 +30,7 @@ def shutter_over_round_window(signal: np.ndarray, scene: Scene, size: np.ndarray
 @form(
     Stage.ELECTRICAL,
     "A draw-wire spans the joint from phalanx to phalanx: third side of a triangle (law of cosines).",
-    set_aside=True,
+    only_by_name=True,
     judged_by="straight_line",
 )
 def wire_spans_the_joint(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:
@@ -48,7 +48,7 @@ def wire_spans_the_joint(signal: np.ndarray, scene: Scene, size: np.ndarray, dra
 @form(
     Stage.ELECTRICAL,
     "Conducting grains touch: a power of the distance from the threshold (percolation; Kirkpatrick 1973).",
-    set_aside=True,
+    only_by_name=True,
     judged_by="straight_line",
 )
 def grains_percolate(signal: np.ndarray, scene: Scene, size: np.ndarray, draws: Draws) -> np.ndarray:

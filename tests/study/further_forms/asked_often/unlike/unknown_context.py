@@ -36,7 +36,7 @@ def _elevation(scene: Scene, draws: Draws) -> tuple[str, np.ndarray]:
 @form(
     Stage.WEARING,
     "A Hall sensor sees the earth's field too, by the cosine of heading and own bend together (ours).",
-    set_aside=True,
+    only_by_name=True,
     touches="one_or_all",
     column=_heading,
 )
@@ -49,7 +49,7 @@ def earth_field_as_hand_turns(signal: np.ndarray, scene: Scene, size: np.ndarray
 @form(
     Stage.WEARING,
     "Stray light adds to a fibre's own light before a logarithmic amplifier: the logarithm of a sum (ours).",
-    set_aside=True,
+    only_by_name=True,
     touches="one_or_all",
     column=_light,
 )
@@ -66,7 +66,7 @@ def stray_light_before_logarithm(
 @form(
     Stage.WEARING,
     "Blood leaves a raised hand within half a minute: delayed sine of the arm's elevation (ours).",
-    set_aside=True,
+    only_by_name=True,
     touches="one_or_all",
     column=_elevation,
 )
