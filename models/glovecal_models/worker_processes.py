@@ -28,10 +28,11 @@ import sys
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, BinaryIO, TypeVar
@@ -116,27 +117,39 @@ def side_by_side(
     work: Callable[[Task, Cancel | None], Result], tasks: Sequence[Task], cancelled: Cancel | None = None
 ) -> Iterator[Result]:
     """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` that ``cancelled`` brings.
-    Where there are none this process does it, each when it is asked for.
+
+    These begin at once, while the caller may do something else; the last tasks, where they are too few for
+    all workers, are done by this process, too. Where there are no workers it does each when it is asked for.
 
     ``work`` as in ``work_off``; it is also told when to stop, unless in a worker, which is ended. Whoever
     asks for no further result leaves the rest undone. Raises Cancelled, WorkerDied, and of what ``work``
     raises the error of the first task.
     """
-    pool = cancelled.pool if isinstance(cancelled, _CancelWithPool) else None
-    if pool is None or len(tasks) < 2:
-        for task in tasks:
-            yield work(task, cancelled)
-        return
+    if not isinstance(cancelled, _CancelWithPool) or len(tasks) < 2:
+        return (work(task, cancelled) for task in tasks)
+    here = partial(_result_or_error_here, work, cancelled.cancelled)
+    return _in_order(cancelled.pool.begun(partial(_result_or_error, work), tasks, cancelled, here))
+
+
+def _in_order(results: Generator[tuple[int, Result | Exception]]) -> Iterator[Result]:
     early: dict[int, Result | Exception] = {}
     wanted = 0
-    for number, result in pool.results(partial(_result_or_error, work), tasks, cancelled):
-        early[number] = result
-        while wanted in early:
-            outcome = early.pop(wanted)
-            if isinstance(outcome, Exception):
-                raise outcome
-            yield outcome
-            wanted += 1
+    with closing(results):
+        for number, result in results:
+            early[number] = result
+            while wanted in early:
+                outcome = early.pop(wanted)
+                if isinstance(outcome, Exception):
+                    raise outcome
+                yield outcome
+                wanted += 1
+
+
+def load_ahead(cancelled: Cancel | None, module: str) -> None:
+    """Have the ``shared_workers`` load a module while they have nothing to do; one that is not there is no
+    error yet."""
+    if isinstance(cancelled, _CancelWithPool):
+        cancelled.pool.load_ahead(module)
 
 
 def _result_or_error(work: Callable[[Task, None], Result], task: Task) -> Result | Exception:
@@ -145,6 +158,16 @@ def _result_or_error(work: Callable[[Task, None], Result], task: Task) -> Result
         return work(task, None)
     except Exception as error:
         return _portable(error)
+
+
+def _result_or_error_here(
+    work: Callable[[Task, Cancel | None], Result], cancelled: Cancel | None, task: Task
+) -> Result | Exception:
+    """The same in this process, which is asked to stop; it has no workers, as they are busy."""
+    try:
+        return work(task, cancelled)
+    except Exception as error:
+        return error
 
 
 _STOP = None
@@ -181,48 +204,87 @@ class _Pool:
     def results(
         self, work: Callable[[Task], Result], tasks: Iterable[Task], cancelled: Cancel | None
     ) -> Iterator[tuple[int, Result]]:
-        """The number and the result of each task, in any order."""
+        """The number and the result of each task, in any order. A task is asked for when a worker is free."""
         answers: SimpleQueue[Any] = SimpleQueue()
         orders = (_Order(work, number, task, answers) for number, task in enumerate(tasks))
         unanswered = 0
         for order in islice(orders, self._workers):
-            self._orders.put(order)
+            self._orders.put(deque([order]))
             unanswered += 1
         while unanswered:
             stop_if(cancelled, self._what)
-            try:
-                number, result, error = answers.get(timeout=POLL_S)
-            except Empty:
+            answer = _answered(answers)
+            if answer is None:
                 continue
-            if error is not None:
-                raise error
             unanswered -= 1
             for order in islice(orders, 1):
-                self._orders.put(order)
+                self._orders.put(deque([order]))
                 unanswered += 1
-            yield number, result
+            yield answer
+
+    def begun(
+        self,
+        work: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        cancelled: Cancel | None,
+        here: Callable[[Task], Result],
+    ) -> Generator[tuple[int, Result]]:
+        """The same, begun at once; ``here`` is as ``work``, for tasks that this process does."""
+        answers: SimpleQueue[Any] = SimpleQueue()
+        waiting = deque(_Order(work, number, task, answers) for number, task in enumerate(tasks))
+        self._orders.put(waiting)
+        return self._answers(waiting, answers, len(tasks), cancelled, here)
+
+    def _answers(
+        self,
+        waiting: deque[_Order],
+        answers: SimpleQueue[Any],
+        count: int,
+        cancelled: Cancel | None,
+        here: Callable[[Any], Any],
+    ) -> Generator[tuple[int, Any]]:
+        try:
+            while count:
+                stop_if(cancelled, self._what)
+                own = _popped(waiting.pop) if len(waiting) < self._workers else None
+                answer = _answered(answers) if own is None else (own.number, here(own.task))
+                if answer is not None:
+                    count -= 1
+                    yield answer
+        finally:
+            waiting.clear()
+
+    def load_ahead(self, module: str) -> None:
+        for _ in range(self._workers):
+            self._orders.put(deque([_Order(import_module, 0, module, SimpleQueue())]))
 
     def _oversee(self) -> None:
         """Hand each order to a worker that is free, or to a new one; at ``_STOP`` end all of them."""
         workers: list[_Worker] = []
         free: list[_Worker] = []
-        waiting: deque[_Order] = deque()
+        waiting: deque[deque[_Order]] = deque()
+        order: _Order | None = None
         try:
-            while (order := self._orders.get()) is not _STOP:
-                if isinstance(order, _Worker):
-                    free.append(order)
+            while (item := self._orders.get()) is not _STOP:
+                if isinstance(item, _Worker):
+                    free.append(item)
                 else:
-                    waiting.append(order)
-                while waiting and (free or len(workers) < self._workers):
+                    waiting.append(item)
+                while free or len(workers) < self._workers:
+                    order = _first(waiting)
+                    if order is None:
+                        break
                     if not free:
                         free.append(_Worker(self._what, self._orders))
                         workers.append(free[-1])
-                    free.pop().orders.put(waiting.popleft())
+                    free.pop().orders.put(order)
+                    order = None
         except BaseException as error:
-            for order in waiting:
+            while (order := order or _first(waiting)) is not None:
                 order.answer(None, error)
-            while (order := self._orders.get()) is not _STOP:
-                if isinstance(order, _Order):
+                order = None
+            while (item := self._orders.get()) is not _STOP:
+                while isinstance(item, deque) and (order := _popped(item.popleft)) is not None:
                     order.answer(None, error)
         finally:
             for worker in workers:
@@ -230,6 +292,34 @@ class _Pool:
             for worker in workers:
                 worker.thread.join()
             self._ended.put(_STOP)
+
+
+def _answered(answers: SimpleQueue[Any]) -> tuple[int, Any] | None:
+    """None while there is no answer yet."""
+    try:
+        number, result, error = answers.get(timeout=POLL_S)
+    except Empty:
+        return None
+    if error is not None:
+        raise error
+    return number, result
+
+
+def _first(waiting: deque[deque[_Order]]) -> _Order | None:
+    """Taken from the first that has any; a caller may take from them meanwhile."""
+    while waiting:
+        order = _popped(waiting[0].popleft)
+        if order is not None:
+            return order
+        waiting.popleft()
+    return None
+
+
+def _popped(pop: Callable[[], _Order]) -> _Order | None:
+    try:
+        return pop()
+    except IndexError:
+        return None
 
 
 @dataclass(frozen=True)

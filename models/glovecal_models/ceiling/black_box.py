@@ -79,6 +79,10 @@ def left_by_box(
     ``products``: places of columns that are multiplied with one another.
     """
     exchanged = exchanged or {}
+    try:
+        import sklearn.ensemble  # noqa: F401  a second to load; the limit below is of pools that are there
+    except ModuleNotFoundError as error:
+        raise BadInput(not_installed("the ceiling", "scikit-learn")) from error
     count = int(take.max()) + 1
     parts = np.zeros((PARTS, len(target)))
     other = {name: np.zeros((PARTS, len(target))) for name in exchanged}
@@ -106,10 +110,8 @@ class _Box:
         self, columns: np.ndarray, target: np.ndarray, take: np.ndarray, seed: int,
         products: Sequence[tuple[int, ...]],
     ) -> None:  # fmt: skip
-        try:
-            from sklearn.ensemble import HistGradientBoostingRegressor  # a second to import
-        except ModuleNotFoundError as error:
-            raise BadInput(not_installed("the ceiling", "scikit-learn")) from error
+        from sklearn.ensemble import HistGradientBoostingRegressor
+
         self._products = products
         self._standard = _Standard(columns)
         x = self._standard.of(columns)
