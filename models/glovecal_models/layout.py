@@ -11,8 +11,8 @@ Wang & Neff 2013, section 3.3, calls the last part the sensor-rotation correspon
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from typing import Any, Literal
@@ -91,6 +91,11 @@ class Layout:
             + did_you_mean(rotation, self.rotations, there="it has")
         )
 
+    def read_without(self, sensors: Collection[str]) -> Layout:
+        """The same sensors; rotations that no sensor measures by itself are read from others than ``sensors``,
+        where there are any."""
+        return replace(self, correspondences=tuple(_without(item, sensors) for item in self.correspondences))
+
     @classmethod
     def from_toml(cls, text: str, *, source: str = "layout") -> Layout:
         """Parse a layout file; ``source`` names it in errors. Raises BadLayout."""
@@ -133,6 +138,14 @@ class Layout:
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
         """Inverse of ``to_document``. Raises BadLayout."""
         return _from_document(document, str(document.get("name", "layout")))
+
+
+def _without(item: Correspondence, sensors: Collection[str]) -> Correspondence:
+    left = tuple(name for name in item.sensors if name not in sensors)
+    if item.measuring_sensor is not None or item.simulated is not None or not left:
+        return item
+    kind = item.kind if item.kind == "MSMR" or len(left) > 1 else "1S1R"
+    return replace(item, sensors=left, kind=kind)
 
 
 def built_in_toml(name: str) -> str:

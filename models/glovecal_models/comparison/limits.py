@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from glovecal_models.limit import limit
 
 _CHOSEN = "Not tuned; chosen."
+_PLANTED = (
+    "Tuned with faults planted into real takes of three people's ankle sleeves and one's gait, of which no take"
+    " may be odd as it came; four other people were kept apart (2026-11-28)."
+)
 _ODD = (
     "Tuned on flex gloves of five sensors and simulated sessions with every known cause, of which no take"
     " may be odd; then none in 24 sessions of another seed (2026-11-25)."
@@ -154,6 +158,37 @@ class ComparisonLimits:
     )
     odd_alike_share: float = limit(
         0.8, "share of the error", "Changes that leave errors nearer to each other are not told apart.", _ODD
+    )
+    exchanged_share: float = limit(
+        0.4,
+        "share of the squared difference",
+        "Columns are exchanged where that leaves so little between a take and the others, in like postures.",
+        _PLANTED + " As they came, exchanging left 1.1 at least; two of three exchanged columns leave 0.5.",
+    )
+    exchanged_times: float = limit(
+        4.0,
+        "times the squared difference of the others",
+        "Sensors of a take that differ less from the others', in like postures, are not exchanged.",
+        _PLANTED,
+    )
+    exchanged_least: float = limit(
+        1.2, "times the squared difference of the others", "The same of reference columns.", _PLANTED
+    )
+    other_level_least: float = limit(
+        0.65,
+        "standard deviations",
+        "Most sensors of a take must be so far from the others', in like postures, to be somebody else's.",
+        _PLANTED,
+    )
+    other_level_times: float = limit(1.5, "times the others' distance", "The same.", _PLANTED)
+    wandering_deg: float = limit(
+        4.0, "degrees", "A reference that wanders less within a take is not told.", _PLANTED
+    )
+    wandering_share: float = limit(
+        0.6,
+        "share of the error",
+        "A slow change with time must leave so little of what sensors do not explain of a take.",
+        _PLANTED,
     )
 
 

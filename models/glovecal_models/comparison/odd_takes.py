@@ -18,9 +18,12 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from glovecal_models.comparison.like_postures import Unlike, unlike_takes
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
+from glovecal_models.comparison.wandering_reference import wandering_references
 from glovecal_models.layout import Layout
-from glovecal_models.takes.clock_scan import LOOKS_LIKE_LAG_S, aligned, clock_offsets
+from glovecal_models.takes.channel_faults import session_faults
+from glovecal_models.takes.clock_scan import LOOKS_LIKE_LAG_S, aligned, clock_offsets, on_grid, unexplained
 from glovecal_models.takes.take import Take
 
 FEWEST_TAKES = 3
@@ -35,7 +38,12 @@ KEPT = 0.9
 """An assignment must save so much more than a column's own place; cycles that do not are put back."""
 
 Item = TypeVar("Item")
-How = Literal["shift", "signs", "sensors", "rotations", "columns", "gains", "own map", "level", "nothing"]
+How = Literal[
+    "shift", "signs", "sensors", "rotations", "columns", "gains", "own map", "level", "wandering", "nothing"
+]
+OTHER_LEVEL = "Its readings lie elsewhere at the same angles. Another person, another glove, or another zero?"
+UNEXPLAINED = 0.1
+"""Share of the reference's variance: where readings leave more of most takes, their clocks are looked at."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +63,25 @@ class OddTake:
     """Its error then."""
     change: str
     """What makes it fit, as a part of a sentence."""
+    in_like_postures: bool = False
+    """Whether errors are of readings where joints stand alike, as degrees that move them as far; else of a
+    line."""
 
     @property
     def sentence(self) -> str:
-        start = (
-            f"Take {self.take!r} does not fit the others: {self.error_deg:.1f} degrees off a line through"
-            f" them, which are at most {self.usual_deg:.1f} off."
-        )
+        start = f"Take {self.take!r} does not fit the others: "
+        if self.how == "wandering":
+            return f"{start}{self.change}"
+        if self.in_like_postures:
+            start += (
+                f"where joints stand alike, its readings are as far from theirs as {self.error_deg:.1f} degrees"
+                f" move them; theirs are at most {self.usual_deg:.1f} apart."
+            )
+        else:
+            start += (
+                f"{self.error_deg:.1f} degrees off a line through them, which are at most {self.usual_deg:.1f}"
+                " off."
+            )
         if self.how == "nothing":
             return f"{start} No change of columns, signs, gains or clock makes it fit."
         if self.how == "level":
@@ -84,6 +104,9 @@ def odd_takes(
     """The worst first; none among fewer than three takes, and never half of them or more."""
     if not all(set(layout.sensors) <= set(take.sensors) for take in takes):
         return ()  # whoever works with them says which sensor is missing
+    first = _in_like_postures(takes, layout, limits)
+    if first:
+        return tuple(first)
     sums = [_Sums.of(take, layout) for take in takes]
     told = [number for number, each in enumerate(sums) if each.is_told]
     most = (len(told) - 1) // 2
@@ -106,6 +129,41 @@ def odd_takes(
         place, odd_level = far
         found.append(replace(odd_level, place=left.pop(place)))
     return tuple(found)
+
+
+def _in_like_postures(takes: Sequence[Take], layout: Layout, limits: ComparisonLimits) -> list[OddTake]:
+    """Those that other takes of their wearing contradict, and one whose reference wanders."""
+    faulty = {name for _, fault in session_faults(takes, layout.sensors) for name in fault.channels}
+    sensors, takes = [name for name in layout.sensors if name not in faulty], _on_one_clock(takes)
+    found = [_unlike(item, takes[item.place]) for item in unlike_takes(takes, sensors, layout, limits)]
+    places = [place for place in range(len(takes)) if place not in {item.place for item in found}]
+    for item in wandering_references([takes[place] for place in places], sensors, layout, limits):
+        place = places[item.place]
+        change = (
+            f"the reference of {item.rotation} wanders by {item.by_deg:.0f} degrees from its beginning to its end"
+            " while the sensors do not. Did a marker slip? Record it again."
+        )
+        found.append(
+            OddTake(place, takes[place].name, item.off_deg, item.usual_deg, "wandering", item.fitted_deg, change)
+        )
+    return found
+
+
+def _unlike(item: Unlike, take: Take) -> OddTake:
+    what = {"sensors": "sensor columns", "rotations": "reference columns"}.get(item.how)
+    change = OTHER_LEVEL if what is None else f"Its {what} {' and '.join(item.names)} are exchanged"
+    return OddTake(
+        item.place, take.name, item.off_deg, item.usual_deg, item.how, item.fitted_deg, change, True
+    )
+
+
+def _on_one_clock(takes: Sequence[Take]) -> Sequence[Take]:
+    """With each reference on its frames' clock, where the readings tell that most are not."""
+    grids = [grid for take in takes if (grid := on_grid(take)) is not None]
+    left = [unexplained(grid, grid.readings, grid.time_s) for grid in grids]
+    if not left or not np.nanmedian(left) > UNEXPLAINED:
+        return takes
+    return [aligned(take, found.offset_s) for take, found in zip(takes, clock_offsets(takes), strict=True)]
 
 
 def fitting(items: Sequence[Item], odd: Sequence[OddTake]) -> list[Item]:
@@ -247,9 +305,8 @@ def _farthest(
         return None
     if sums[best].error(lines[best]) > limits.odd_level_told_share * sums[best].spread(lines[best]):
         return None  # a line that does not follow the angles tells no level
-    change = "Its readings lie elsewhere at the same angles. Another person, another glove, or another zero?"
     error = sums[best].error(lines[best])
-    return best, OddTake(best, takes[best].name, off[best], others, "level", error, change)
+    return best, OddTake(best, takes[best].name, off[best], others, "level", error, OTHER_LEVEL)
 
 
 def _levels(sums: Sequence[_Sums], line: _Line) -> np.ndarray:

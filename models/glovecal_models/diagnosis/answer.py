@@ -160,6 +160,8 @@ class MissingEffects(AboutTakes):
     findings: Sequence[FoundInRecording] = ()
     camera_ranges: Sequence[CoveredRange] = ()
     """Of rotations that a camera measured: angles outside of these ranges are not judged."""
+    sensor_problems: Sequence[str] = ()
+    """Faults that readings show by themselves, before any effect is tried."""
     reference_problems: Sequence[str] = ()
     hold_drift: DriftInHolds | None = None
     actions: Sequence[Remedy] = ()
@@ -222,7 +224,7 @@ class MissingEffects(AboutTakes):
         if self.odd_takes:
             without = "".join(f" --leave-out {take.id}" for take in self.odd_takes)
             return self._train(self.method or "lmc_gpr") + without
-        if self.reference_problems:
+        if self.sensor_problems or self.reference_problems:
             return f"glovecal take check {self._spoken_of}"
         if named is not None and named.kind == "finding":
             return f"glovecal record GLOVE after-mending --seconds {LONG_ENOUGH_S}"
@@ -263,8 +265,12 @@ class MissingEffects(AboutTakes):
     def _spoken_of(self) -> str:
         """The id of the take that the first problem speaks of, else of the first: names need not be
         unique."""
-        problem = self.reference_problems[0]
-        spoken_of = [take for take in self.takes if f"take {take.name}:" in problem]
+        problem = [*self.sensor_problems, *self.reference_problems][0]
+        spoken_of = [
+            take
+            for take in self.takes
+            if f"take {take.name}:" in problem or problem.startswith(f"Take {take.name!r}:")
+        ]
         return next((take.id for take in (*spoken_of, *self.takes)), "TAKE")
 
     @property
@@ -278,6 +284,7 @@ class MissingEffects(AboutTakes):
         told = {
             "Takes set aside": [item.sentence for item in self.odd_takes],
             "Excluded from the reference": self.excluded,
+            "Problems of sensors": self.sensor_problems,
             "Problems of the reference": self.reference_problems,
             "Found in the recording": [item.sentence for item in self.findings],
         }

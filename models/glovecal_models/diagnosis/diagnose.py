@@ -36,7 +36,9 @@ from glovecal_models.effects.base.relations import Motion
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
+from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import sensor_sentences
 
 
 def diagnose(
@@ -61,20 +63,22 @@ def diagnose(
 
     Raises BadInput, Cancelled.
     """
+    faults = session_faults(takes, layout.sensors)
     begun = asked(
         takes,
-        layout,
+        layout.read_without({name for _, fault in faults for name in fault.channels}),
         Choices(
             linear=linear, known=tuple(known), effects=None if effects is None else tuple(effects),
             signatures=signatures, judge_residual=judge_residual, own=tuple(own), noise_floors=noise_floors,
             found_before=found_before, seed=seed, limits=limits, cancelled=cancelled, report=report,
         ),
     )  # fmt: skip
+    told = tuple(sensor_sentences(faults))
     if are_pose_labels(takes):
-        return _of_pose_labels(begun)
+        return replace(_of_pose_labels(begun), sensor_problems=told)
     *_, ended = states(begun)
     begun.question.progress("done", 1.0)
-    return concluded(ended)
+    return replace(concluded(ended), sensor_problems=told)
 
 
 def asked(takes: Sequence[Take], layout: Layout, choices: Choices) -> State:

@@ -35,6 +35,8 @@ class Diagnosis:
     """Every identifiable effect."""
     not_identifiable: tuple[NotIdentifiable, ...]
     reference_problems: tuple[str, ...]
+    sensor_problems: tuple[str, ...] = ()
+    """Faults that readings show by themselves; rotations are read from other sensors where there are any."""
     findings: tuple[Finding, ...]
     """What is known by a signature in the recording."""
     signature: tuple[Finding, ...] = ()

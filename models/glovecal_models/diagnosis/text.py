@@ -45,7 +45,7 @@ UNITS = "The reference only names poses: errors are shares of the step from 0 to
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     """What a mocap engineer should know, the most important first."""
-    sentences = [*diagnosis.reference_problems, *camera_sentences(diagnosis)]
+    sentences = [*diagnosis.sensor_problems, *diagnosis.reference_problems, *camera_sentences(diagnosis)]
     sentences += [item.sentence for item in diagnosis.findings]
     if diagnosis.naming.ranked:
         sentences.append(ranked_sentence(diagnosis))
@@ -368,6 +368,7 @@ def missing_effects(diagnosis: Diagnosis) -> MissingEffects:
             ),
         ],
         camera_ranges=() if camera is None else camera.ranges,
+        sensor_problems=diagnosis.sensor_problems,
         reference_problems=diagnosis.reference_problems,
         hold_drift=None if held is None else drift_in_holds(held),
         actions=[remedy(item) for item in diagnosis.actions],

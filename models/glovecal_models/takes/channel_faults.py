@@ -1,15 +1,16 @@
-"""Faults of channels that one take shows by itself: a flat line in the middle of motion, clipping, and two
-channels that read the same.
+"""Faults of channels that readings show by themselves: a flat line in the middle of motion, clipping, a
+channel that is dead, two that read the same, and two that are exchanged from a moment on.
 
 A finger at rest reads one value for seconds on a coarse and quiet glove, so that a flat line tells nothing
 there. Where a channel goes to and fro by itself even while it hardly moves, or has so many steps that a hand
 at rest crosses some, it is never still; then a flat line while most others move was not made by the finger.
+Two channels that a finger moves alike differ by what moves as it does; a copy differs by noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -27,10 +28,22 @@ TIMES_LONGER = 4.0
 """A flat line, than anything else that the channel repeats: readings may be held for a few frames."""
 CLIPPED_FRAMES, CLIPPED_SHARE, CLIPPED_S = 5, 0.04, 0.2
 """Frames in a row at one end of the range, and their share of all frames and seconds together."""
+CLIPPED_AT_MOST = 0.5
+"""Share of the frames of a take in one flat line: a longer one is no end of a movement."""
 OTHERS_MOVE = 0.5
 """Share of the other channels that change in most of the frames meanwhile."""
 SAME_SHARE, STEPS_WIDE = 0.99, 30
 """Of the frames in which two channels lie within a step of each other, over a range of so many."""
+COPY_SHARE, COPY_FOLLOWS = 0.02, 0.3
+"""Of the range, which the difference of a copy spreads by; and how far that goes along with itself a frame
+later, or with the channel."""
+EXCHANGE_TIMES, EXCHANGE_SHARE = 4.0, 0.25
+"""Both channels step by so many times all else they do within a frame, each to within so much of that of where
+the other was."""
+PAUSE_FRAMES = 3.0
+"""After a longer one a channel may be anywhere."""
+LIVES_SHARE, LEAST_MOVED_DEG = 0.3, 10.0
+"""Of its range over all takes, through which a channel goes in a take in which the hand moves; and the joint."""
 
 
 @dataclass(frozen=True)
@@ -45,27 +58,107 @@ class ChannelFault:
         return f"{' and '.join(self.channels)} {self.what}"
 
 
-def channel_faults(take: Take) -> tuple[ChannelFault, ...]:
-    """In the order of the channels; frames must be in order of time."""
+def session_faults(
+    takes: Sequence[Take], sensors: Sequence[str] | None = None
+) -> tuple[tuple[Take, ChannelFault], ...]:
+    """Each take with what it shows of those of ``sensors`` (None: any) that all takes have."""
+    takes = [take for take in takes if len(take.time_s) > 1]
+    shared = set[str]() if not takes else set.intersection(*(set(take.sensors) for take in takes))
+    names = tuple(name for name in sensors or (takes[0].sensors if takes else ()) if name in shared)
+    if not names:
+        return ()
+    takes = [_with_sensors(take, names) for take in takes]
+    low = np.min([take.readings.min(axis=0) for take in takes], axis=0)
+    high = np.max([take.readings.max(axis=0) for take in takes], axis=0)
+    found = []
+    for take in takes:
+        dead = _dead(take, takes, high - low)
+        found += [(take, fault) for fault in dead]
+        gone = {name for fault in dead for name in fault.channels}
+        found += [
+            (take, fault)
+            for fault in channel_faults(take, (low, high))
+            if not gone.intersection(fault.channels)
+        ]
+    return tuple(found)
+
+
+def _with_sensors(take: Take, names: tuple[str, ...]) -> Take:
+    if take.sensors == names:
+        return take
+    order = [take.sensors.index(name) for name in names]
+    return replace(take, sensors=names, readings=take.readings[:, order])
+
+
+def _dead(take: Take, takes: Sequence[Take], ranges: np.ndarray) -> list[ChannelFault]:
+    """Channels that stand at one value, or between two, while the hand moves."""
+    low, high = take.readings.min(axis=0), take.readings.max(axis=0)
+    two = ((take.readings == low) | (take.readings == high)).all(axis=0)
+    if not two.any() or len(take.time_s) < STUCK_FRAMES:
+        return []
+    lives = (high - low >= LIVES_SHARE * ranges) & ~two
+    found = []
+    for index in np.flatnonzero(two):
+        name = take.sensors[index]
+        has_lived = ranges[index] > high[index] - low[index]
+        # Of a joint that was not measured, only what moved elsewhere is known to be able to.
+        measured = [name] if name in take.rotations else list(take.rotations)
+        angles = take.reference[:, [take.rotations.index(each) for each in measured]]
+        moved = any(_moved(column) >= LEAST_MOVED_DEG for column in angles.T)
+        others = np.delete(lives, index)
+        never_still = has_lived and _is_never_still(takes, name)
+        if others.any() and others.mean() >= OTHERS_MOVE and (
+            moved if name in take.rotations or not has_lived else never_still
+        ):
+            level = f"{low[index]:g}" if low[index] == high[index] else f"{low[index]:g} or {high[index]:g}"
+            found.append(
+                ChannelFault((name,), f"is dead: always {level} while others move", "Is its wire broken?")
+            )
+    return found
+
+
+def _moved(angles: np.ndarray) -> float:
+    known = angles[np.isfinite(angles)]
+    return float(np.ptp(known)) if len(known) else 0.0
+
+
+def _is_never_still(takes: Sequence[Take], name: str) -> bool:
+    columns = [take.readings[:, take.sensors.index(name)] for take in takes]
+    return any(_moves_always(column, smallest_step(column)) for column in columns)
+
+
+def _moves_always(values: np.ndarray, step: float) -> bool:
+    return step > 0 and (bool(np.ptp(values) >= FINE_COUNTS * step) or _is_restless(values))
+
+
+def channel_faults(
+    take: Take, ends: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[ChannelFault, ...]:
+    """In the order of the channels; frames must be in order of time. ``ends`` (S,) of each channel's range;
+    None: the take's own."""
     time_s, readings, names = take.time_s, take.readings, take.sensors
+    low, high = (readings.min(axis=0), readings.max(axis=0)) if ends is None else ends
     faults: list[ChannelFault] = []
     changes = np.diff(readings, axis=0, prepend=np.nan) != 0
     for index, name in enumerate(names):
         values = readings[:, index]
         step = smallest_step(values)
-        if step == 0 or not (np.ptp(values) >= FINE_COUNTS * step or _is_restless(values)):
+        if np.ptp(values) < 1.5 * step or not _moves_always(values, step):
             continue
         others = np.delete(changes, index, axis=1)
-        faults += _flat_lines(time_s, values, others, name)
-    return (*faults, *_same(readings, names))
+        faults += _flat_lines(time_s, values, others, name, (low[index], high[index]))
+    return (*faults, *_same(readings, names), *_exchanged(time_s, readings, names))
 
 
-def _flat_lines(time_s: np.ndarray, values: np.ndarray, others: np.ndarray, name: str) -> list[ChannelFault]:
+def _flat_lines(
+    time_s: np.ndarray, values: np.ndarray, others: np.ndarray, name: str, ends: tuple[float, float]
+) -> list[ChannelFault]:
     start, end = constant_runs(values)
     if not len(start) or not others.shape[1]:
         return []
     length = end - start
-    at_end = (values[start] == values.min()) | (values[start] == values.max())
+    at_end = (values[start] == ends[0]) | (values[start] == ends[1])
+    at_end &= length < CLIPPED_AT_MOST * len(values)
     lasts = (length >= STUCK_FRAMES) & (time_s[end - 1] - time_s[start] >= STUCK_S) & ~at_end
     usual = int(length[~lasts & ~at_end].max(initial=1))
     odd = (length >= TIMES_LONGER * usual) & (lasts | (at_end & (length >= CLIPPED_FRAMES)))
@@ -125,8 +218,48 @@ def _same(readings: np.ndarray, names: Sequence[str]) -> list[ChannelFault]:
     ]
     found = []
     for one, other in combinations(moving, 2):
-        apart = np.abs(readings[:, one] - readings[:, other])
-        if (apart <= min(steps[one], steps[other])).mean() >= SAME_SHARE:
+        apart = readings[:, one] - readings[:, other]
+        is_within = (np.abs(apart) <= min(steps[one], steps[other])).mean() >= SAME_SHARE
+        if is_within or _is_copy(readings[:, one], apart):
             both = names[one], names[other]
             found.append(ChannelFault(both, "read the same", "Is one wired to the other, or counted twice?"))
+    return found
+
+
+def _is_copy(values: np.ndarray, apart: np.ndarray) -> bool:
+    """Whether (N,) differences from a channel are its copy's noise."""
+    if np.sqrt(np.mean(apart**2)) > COPY_SHARE * np.ptp(values) or len(apart) < STUCK_FRAMES:
+        return False
+    away, own = apart - apart.mean(), values - values.mean()
+    whole = float(away @ away)
+    if whole == 0:
+        return True
+    later = float(away[1:] @ away[:-1]) / whole
+    along = float(away @ own) / np.sqrt(whole * float(own @ own))
+    return max(abs(later), abs(along)) <= COPY_FOLLOWS
+
+
+def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -> list[ChannelFault]:
+    """Pairs that go on where the other one was, each within one frame."""
+    if len(time_s) < STUCK_FRAMES:
+        return []
+    steps = np.abs(np.diff(readings, axis=0))
+    at = steps.argmax(axis=0)
+    rest = steps.copy()
+    rest[at, np.arange(len(names))] = 0.0
+    height, usual = steps.max(axis=0), rest.max(axis=0)
+    pause = PAUSE_FRAMES * float(np.median(np.diff(time_s)))
+    found = []
+    for one, other in combinations(range(len(names)), 2):
+        row = int(at[one])
+        pair = [one, other]
+        if at[other] != row or time_s[row + 1] - time_s[row] > pause:
+            continue
+        if (height[pair] < EXCHANGE_TIMES * usual[pair]).any():
+            continue
+        missed = np.abs(readings[row + 1, pair] - readings[row, pair[::-1]])
+        if (missed <= EXCHANGE_SHARE * height[pair]).all():
+            both = names[one], names[other]
+            what = f"exchange their readings at {time_s[row + 1]:.2f} s"
+            found.append(ChannelFault(both, what, "Was a plug moved? Leave out what follows, or record again."))
     return found

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glovecal_models.presentation.document import answer
-from glovecal_models.takes.channel_faults import channel_faults
+from glovecal_models.takes.channel_faults import ChannelFault, channel_faults
 from glovecal_models.takes.raw_table import time_unit_warning
 from glovecal_models.takes.reference_jumps import (
     frames_with_reference,
@@ -67,7 +67,7 @@ def _why(name: str, values: np.ndarray, takes: Sequence[Take], count: float) -> 
         return f"always {low + 0.0:g}"
     if len(values) < FEWEST_FRAMES:
         return None
-    if high - low <= count:
+    if high - low <= 1.001 * count:
         return f"only {low + 0.0:g} or {high + 0.0:g}"
     end = high if np.mean(values == high) > np.mean(values == low) else low
     share = float(np.mean(values == end))
@@ -222,6 +222,11 @@ def _frame_warnings(
 def take_warnings(takes: Sequence[Take]) -> list[str]:
     """The sentences of ``check_take``; of those that differ in numbers alone the first, and how many more."""
     return alike_once([each for take in takes if len(take.time_s) for each in check_take(take).sentences])
+
+
+def sensor_sentences(faults: Sequence[tuple[Take, ChannelFault]]) -> list[str]:
+    """What is wrong with sensors, that the joints did not do; of several takes the first, and how many more."""
+    return alike_once([f"Take {take.name!r}: {fault}. {fault.remedy}" for take, fault in faults])
 
 
 def excluded_sentences(takes: Sequence[Take]) -> list[str]:
