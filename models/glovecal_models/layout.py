@@ -92,7 +92,7 @@ class Layout:
         )
 
     def read_without(self, sensors: Collection[str]) -> Layout:
-        """The same sensors; rotations that no sensor measures by itself are read from others than ``sensors``,
+        """The same sensors; a rotation that none measures by itself is read from others than ``sensors``,
         where there are any."""
         return replace(self, correspondences=tuple(_without(item, sensors) for item in self.correspondences))
 

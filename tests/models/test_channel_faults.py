@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.text import diagnosis_sentences
+from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan
-from glovecal_models.takes.channel_faults import channel_faults
+from glovecal_models.takes.channel_faults import channel_faults, session_faults
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import check_take
@@ -38,10 +41,23 @@ def wire_together(readings: np.ndarray, sensor: int, other: int) -> None:
     readings[:, sensor] = readings[:, other]
 
 
+def wire_noisily(readings: np.ndarray, sensor: int, other: int) -> None:
+    noise = 0.005 * np.ptp(readings[:, other]) * np.random.default_rng(0).normal(size=len(readings))
+    readings[:, sensor] = readings[:, other] + np.round(noise, 1)
+
+
+def exchange_plugs(readings: np.ndarray, sensor: int, other: int) -> None:
+    """Where they are farthest apart."""
+    first = 10 + int(np.argmax(np.abs(readings[10:-10, sensor] - readings[10:-10, other])))
+    readings[first:, [sensor, other]] = readings[first:, [other, sensor]]
+
+
 PLANTS: dict[str, tuple[Plant, str]] = {
     "stuck": (stand_still, "while others move"),
     "clipped": (cut_off, "is cut off at"),
     "same": (wire_together, "read the same"),
+    "nearly the same": (wire_noisily, "read the same"),
+    "exchanged": (exchange_plugs, "exchange their readings"),
 }
 
 
@@ -103,3 +119,32 @@ def sound_gloves() -> Iterator[SessionPlan]:
 def test_nothing_is_told_of_sound_gloves_whatever_they_do() -> None:
     takes = [record_session(plan, ()).takes[0] for plan in islice(sound_gloves(), 60)]
     assert [str(fault) for take in takes for fault in channel_faults(take)] == []
+
+
+def test_a_channel_that_is_dead_is_told_while_the_hand_moves_and_not_while_it_rests() -> None:
+    takes = list(record_session(SessionPlan(seed=3, wearings=1, takes_per_wearing=2), ()).takes)
+    readings = takes[1].readings.copy()
+    readings[:, 2] = readings[0, 2]
+    broken = [takes[0], replace(takes[1], readings=readings)]
+    [(take, fault)] = session_faults(broken)
+    assert take.name == takes[1].name
+    assert str(fault).startswith(f"{takes[0].sensors[2]} is dead: always")
+    resting = replace(broken[1], readings=np.tile(readings[:1], (len(readings), 1)))
+    assert session_faults([takes[0], resting]) == ()
+
+
+def test_a_diagnosis_tells_what_readings_show_first_and_reads_the_others() -> None:
+    plan = SessionPlan(seed=8, wearings=2, takes_per_wearing=3, take_s=20.0, bits=12, sensor_noise_deg=0.2)
+    takes = list(record_session(plan, ()).takes)
+    number = int(np.argmax(np.ptp(takes[1].readings, axis=0)))
+    readings = takes[1].readings.copy()
+    readings[400:700, number] = np.median(readings[:, number])
+    takes[1] = replace(takes[1], readings=readings)
+    takes = [replace(take, sensors=tuple(f"S{each}" for each in range(len(plan.sensors)))) for take in takes]
+    layout = Layout.from_columns("unknown", takes[0].sensors, takes[0].rotations)
+    found = diagnose(takes, layout, effects=())
+    [sentence] = found.sensor_problems
+    assert sentence.startswith(f"Take {takes[1].name!r}: S{number} reads")
+    assert diagnosis_sentences(found)[0] == sentence
+    faulty = {name for name in takes[0].sensors if f" {name} " in sentence}
+    assert all(faulty.isdisjoint(item.sensors) for item in layout.read_without(faulty).correspondences)

@@ -1,7 +1,7 @@
 """Faults planted into real readings and references, and what is told of them.
 
-A fault is found where ``take check``, the takes held against each other, or ``diagnose`` names what is at fault
-and how. A sentence is false where it is about a sensor, a rotation or a take that is sound.
+A fault is found where ``take check``, the takes held against each other, or ``diagnose`` names what is at
+fault and how. A sentence is false where it is about a sensor, a rotation or a take that is sound.
 """
 
 from __future__ import annotations
@@ -79,7 +79,10 @@ class Marked:
 def sessions() -> list[Session]:
     """Real ones; none where the recordings are not here."""
     ankles = [
-        (f"P{person}-placement{placement}", sorted(DATA.glob(f"ankle/P{person}-placement{placement}-*.frames.csv")))
+        (
+            f"P{person}-placement{placement}",
+            sorted(DATA.glob(f"ankle/P{person}-placement{placement}-*.frames.csv")),
+        )
         for placement in (1, 2, 3)
         for person in range(300, 305)
     ]
@@ -136,7 +139,9 @@ def stuck_for(session: Session, random: np.random.Generator, seconds: float = 2.
     values = take.readings[:, sensor].copy()
     values[first : first + frames] = values[first]
     return Planted(
-        _changed(session.takes, number, _with_readings(take, sensor, values)), (take.sensors[sensor],), take.name
+        _changed(session.takes, number, _with_readings(take, sensor, values)),
+        (take.sensors[sensor],),
+        take.name,
     )
 
 
@@ -196,14 +201,14 @@ def swapped_in_one(session: Session, random: np.random.Generator) -> Planted:
 
 
 def swapped_on(session: Session, random: np.random.Generator) -> Planted:
-    """From a moment within a take on."""
+    """From a moment within a take on; where later takes are told, that is right, too."""
     number, pair = int(random.integers(len(session.takes))), _pair(session, random)
     takes = list(session.takes)
     first = int(random.uniform(0.2, 0.8) * len(takes[number].time_s))
     for later in range(number, len(takes)):
         begin = first if later == number else 0
         takes[later] = replace(takes[later], readings=_exchanged(takes[later].readings, pair, begin))
-    return Planted(tuple(takes), tuple(takes[0].sensors[each] for each in pair), takes[number].name)
+    return Planted(tuple(takes), tuple(takes[0].sensors[each] for each in pair))
 
 
 def wired(session: Session, random: np.random.Generator) -> Planted:
@@ -283,7 +288,11 @@ def told(takes: Sequence[Take], layout: Layout, *, linear: bool = True) -> tuple
     odd = odd_takes(takes, layout)
     found = diagnose(fitting(takes, odd), layout, linear=linear, judge_residual=False)
     sentences += [item.told for item in odd]
-    sentences += [*found.sensor_problems, *found.reference_problems, *(item.sentence for item in found.findings)]
+    sentences += [
+        *found.sensor_problems,
+        *found.reference_problems,
+        *(item.sentence for item in found.findings),
+    ]
     named = None if found.named is None else found.named.effect
     return [each for each in dict.fromkeys(sentences) if not TRUE_OF_ALL.search(each)], named
 
@@ -302,10 +311,18 @@ def asked(session: Session, fault: str, number: int) -> Marked:
         right_take = planted.take is None or planted.take in about or not about
         right = bool(planted.names and names & set(planted.names)) or (not names and fault in FAULTS)
         is_named = set(planted.names) <= names and right_take and bool(re.search(words, sentence))
-        is_about = right and right_take if planted.names else planted.take is not None and planted.take in about
+        is_about = (
+            right and right_take if planted.names else planted.take is not None and planted.take in about
+        )
         marked["found" if is_named and is_about else "other" if is_about else "false"].append(sentence)
     return Marked(
-        fault, session.name, number, bool(marked["found"]), tuple(marked["false"]), tuple(marked["other"]), named
+        fault,
+        session.name,
+        number,
+        bool(marked["found"]),
+        tuple(marked["false"]),
+        tuple(marked["other"]),
+        named,
     )
 
 

@@ -17,7 +17,9 @@ from planted_faults import FAULTS, FIRST_HEALTHY, UNTOUCHED, Marked, Session, ma
 
 from glovecal_models.worker_processes import pin_blas_to_one_thread, work_off
 
-HEAD = "| planted | found | 95 % interval | false word | 95 % interval | called otherwise |\n" + "|---" * 6 + "|"
+HEAD = (
+    "| planted | found | 95 % interval | false word | 95 % interval | called otherwise |\n" + "|---" * 6 + "|"
+)
 
 
 def row_of(fault: str, found: Sequence[Marked]) -> str:
@@ -54,10 +56,7 @@ def main(arguments: Sequence[str]) -> int:
     faults = [name for name in FAULTS if name.startswith(options.only)]
     jobs: list[tuple[Session, str, int] | int] = [(session, UNTOUCHED, 0) for session in chosen]
     jobs += [
-        (session, fault, number)
-        for fault in faults
-        for session in chosen
-        for number in range(options.each)
+        (session, fault, number) for fault in faults for session in chosen for number in range(options.each)
     ]
     jobs += range(FIRST_HEALTHY, FIRST_HEALTHY + (1 if options.smoke else options.healthy))
     found: list[Marked | None] = [None] * len(jobs)

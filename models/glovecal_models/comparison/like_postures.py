@@ -1,9 +1,9 @@
 """Takes of one wearing held against each other where their joints stand alike.
 
-A line through takes with different motions says little of one that moves elsewhere. Where two takes go through
-the same angles, their sensors read the same, whatever the map between them is: of a take whose readings there
-are another take's only once two columns are exchanged, the columns are exchanged. Every other take of the
-wearing has to say so. Nothing is asked of postures that no other take has.
+A line through takes with different motions says little of one that moves elsewhere. Where two takes go
+through the same angles, their sensors read the same, whatever the map between them is: of a take whose
+readings there are another take's only once two columns are exchanged, the columns are exchanged. Every other
+take of the wearing has to say so. Nothing is asked of postures that no other take has.
 """
 
 from __future__ import annotations
@@ -53,7 +53,11 @@ def unlike_takes(
     """Those of any wearing, by ``sensors`` that are sound; fewer than half of each wearing's."""
     found = []
     for wearing in dict.fromkeys(take.wearing for take in takes):
-        places = [place for place, take in enumerate(takes) if take.wearing == wearing]
+        places = [
+            place
+            for place, take in enumerate(takes)
+            if take.wearing == wearing and np.isfinite(take.reference).any()
+        ]
         most = (len(places) - 1) // 2
         while most and len(places) > FEWEST_OTHERS:
             odd = _Wearing.of([takes[place] for place in places], sensors, layout.rotations).unlike(limits)
@@ -76,7 +80,7 @@ class _Wearing:
     alike_deg: np.ndarray
     """(R,)."""
     spread_deg: float
-    """RMS of the angles' standard deviations."""
+    """RMS of the angles within takes."""
 
     @classmethod
     def of(cls, takes: Sequence[Take], sensors: Sequence[str], rotations: Sequence[str]) -> _Wearing:
@@ -96,15 +100,17 @@ class _Wearing:
         parts = tuple((x[:, alive], y) for x, y in pairs)
         angles = np.concatenate([y for _, y in parts])
         moved = angles.std(axis=0) if len(angles) else np.zeros(len(measured))
+        within = np.concatenate([y - y.mean(axis=0) if len(y) else y for _, y in pairs])
         alike = np.maximum(ALIKE_DEG, ALIKE_SHARE * moved)
-        usual = float(np.sqrt(np.mean(moved**2))) if len(moved) else 0.0
+        usual = float(np.sqrt(np.mean(within**2))) if within.size else 0.0
         return cls(living, tuple(measured), parts, spread[alive], alike, usual)
 
     def unlike(self, limits: ComparisonLimits) -> Unlike | None:
         if not (len(self.sensors) > 1 and 0 < len(self.rotations) <= MOST_ROTATIONS):
             return None
         for asked in (self._sensors, self._rotations, self._levels):
-            found = min(asked(limits), key=lambda item: item[0], default=None)
+            far = (item for item in asked(limits) if item[1].off_deg >= limits.odd_least_deg)
+            found = min(far, key=lambda item: item[0], default=None)
             if found is not None:
                 return found[1]
         return None
@@ -157,39 +163,63 @@ class _Wearing:
                 left = exchanged / np.maximum(own, 1e-12)
                 whole = float(np.sum(self.spread[[a, b]] ** 2))
                 pair = usual[:, [a, b]] @ self.spread[[a, b]] ** 2
+                least = limits.exchanged_times * float(np.median(pair))
+                off, fitted = float(np.median(own)), float(np.median(exchanged))
                 if (
                     np.median(left) <= limits.exchanged_share
                     and (left < 1.0).all()
-                    and np.median(own) >= limits.exchanged_times * np.median(pair)
+                    and fitted <= least <= off
+                    and self._fit_without((a, b), place, limits)
                 ):
-                    yield float(np.median(left)), Unlike(
-                        place, "sensors", (self.sensors[a], self.sensors[b]),
-                        *(self._degrees(each / whole) for each in (np.median(own), pair.max(), np.median(exchanged))),
-                    )  # fmt: skip
+                    degrees = [self._degrees(each / whole) for each in (off, float(pair.max()), fitted)]
+                    names = self.sensors[a], self.sensors[b]
+                    yield float(np.median(left)), Unlike(place, "sensors", names, *degrees)
+
+    def _fit_without(self, pair: tuple[int, int], place: int, limits: ComparisonLimits) -> bool:
+        """Whether the sensors of a take but two read what they do in the others."""
+        own = np.delete(np.median(self._own(place), axis=0), pair)
+        usual = np.delete(np.median(self._of_others(place), axis=0), pair)
+        return not len(own) or float(own.mean()) <= limits.exchanged_times * float(usual.mean())
 
     def _rotations(self, limits: ComparisonLimits) -> Iterator[tuple[float, Unlike]]:
-        for place in range(len(self.parts)):
-            own, usual = self._own(place), self._of_others(place)
+        """The same of reference columns; in no other take they would fit as well."""
+        count = range(len(self.parts))
+        for place in count:
+            usual = self._of_others(place)
             if not len(usual):
                 continue
-            off = float(np.median(own, axis=0).mean()) if len(own) else np.inf
             typical, most = float(np.median(usual, axis=0).mean()), float(usual.max(axis=0).mean())
-            if off < limits.exchanged_least * typical:
-                continue
             for a, b in combinations(range(len(self.rotations)), 2):
                 order = list(range(len(self.rotations)))
                 order[a], order[b] = b, a
-                tried = [self._squares(place, other, order) for other in range(len(self.parts)) if other != place]
-                fitted = self._against_itself(each for each in tried if each is not None)
-                if len(fitted) < FEWEST_OTHERS:
+                off, left = self._reordered(place, order)
+                if left is None or off < limits.exchanged_least * typical:
                     continue
-                left = float(np.median(fitted, axis=0).mean())
-                if left <= limits.exchanged_share * off and left <= (most if len(own) else typical):
-                    names = self.rotations[a], self.rotations[b]
-                    told = off if np.isfinite(off) else 1.0
-                    yield left / off, Unlike(
-                        place, "rotations", names, self._degrees(told), self._degrees(most), self._degrees(left)
-                    )
+                if left > limits.exchanged_share * off or left > (most if np.isfinite(off) else typical):
+                    continue
+                theirs = [self._reordered(other, order, place) for other in count if other != place]
+                if all(fits is None or fits >= own for own, fits in theirs):
+                    names, told = (self.rotations[a], self.rotations[b]), off if np.isfinite(off) else 1.0
+                    degrees = [self._degrees(each) for each in (told, most, left)]
+                    yield left / off, Unlike(place, "rotations", names, *degrees)
+
+    def _reordered(
+        self, place: int, order: Sequence[int], without: int | None = None
+    ) -> tuple[float, float | None]:
+        """Squared difference from the others as the take is, infinite where no posture is alike, and in
+        another order of its rotations, None where too few takes have such postures."""
+        others = [each for each in range(len(self.parts)) if each not in (place, without)]
+        own = self._against_itself(
+            self.squares[place, each] for each in others if (place, each) in self.squares
+        )
+        tried = [self._squares(place, each, order) for each in others]
+        fitted = self._against_itself(each for each in tried if each is not None)
+        return (
+            float(np.median(own, axis=0).mean()) if len(own) else np.inf,
+            float(np.median(fitted, axis=0).mean())
+            if len(fitted) >= min(FEWEST_OTHERS, len(others))
+            else None,
+        )
 
     def _levels(self, limits: ComparisonLimits) -> Iterator[tuple[float, Unlike]]:
         """Takes of which most sensors read something else than in all others."""

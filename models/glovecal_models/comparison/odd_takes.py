@@ -23,7 +23,14 @@ from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimit
 from glovecal_models.comparison.wandering_reference import wandering_references
 from glovecal_models.layout import Layout
 from glovecal_models.takes.channel_faults import session_faults
-from glovecal_models.takes.clock_scan import LOOKS_LIKE_LAG_S, aligned, clock_offsets, on_grid, unexplained
+from glovecal_models.takes.clock_scan import (
+    LOOKS_LIKE_LAG_S,
+    aligned,
+    clock_offsets,
+    on_grid,
+    unexplained,
+    without_reference,
+)
 from glovecal_models.takes.take import Take
 
 FEWEST_TAKES = 3
@@ -74,13 +81,13 @@ class OddTake:
             return f"{start}{self.change}"
         if self.in_like_postures:
             start += (
-                f"where joints stand alike, its readings are as far from theirs as {self.error_deg:.1f} degrees"
-                f" move them; theirs are at most {self.usual_deg:.1f} apart."
+                f"where joints stand alike, its readings are as far from theirs as {self.error_deg:.1f}"
+                f" degrees move them; theirs are at most {self.usual_deg:.1f} apart."
             )
         else:
             start += (
-                f"{self.error_deg:.1f} degrees off a line through them, which are at most {self.usual_deg:.1f}"
-                " off."
+                f"{self.error_deg:.1f} degrees off a line through them, which are at most"
+                f" {self.usual_deg:.1f} off."
             )
         if self.how == "nothing":
             return f"{start} No change of columns, signs, gains or clock makes it fit."
@@ -140,11 +147,13 @@ def _in_like_postures(takes: Sequence[Take], layout: Layout, limits: ComparisonL
     for item in wandering_references([takes[place] for place in places], sensors, layout, limits):
         place = places[item.place]
         change = (
-            f"the reference of {item.rotation} wanders by {item.by_deg:.0f} degrees from its beginning to its end"
+            f"the reference of {item.rotation} wanders by {item.by_deg:.0f} degrees in the course of the take"
             " while the sensors do not. Did a marker slip? Record it again."
         )
         found.append(
-            OddTake(place, takes[place].name, item.off_deg, item.usual_deg, "wandering", item.fitted_deg, change)
+            OddTake(
+                place, takes[place].name, item.off_deg, item.usual_deg, "wandering", item.fitted_deg, change
+            )
         )
     return found
 
@@ -159,11 +168,26 @@ def _unlike(item: Unlike, take: Take) -> OddTake:
 
 def _on_one_clock(takes: Sequence[Take]) -> Sequence[Take]:
     """With each reference on its frames' clock, where the readings tell that most are not."""
-    grids = [grid for take in takes if (grid := on_grid(take)) is not None]
+    grids = [grid for take in takes if (grid := on_grid(_bridged(take))) is not None]
     left = [unexplained(grid, grid.readings, grid.time_s) for grid in grids]
     if not left or not np.nanmedian(left) > UNEXPLAINED:
         return takes
-    return [aligned(take, found.offset_s) for take, found in zip(takes, clock_offsets(takes), strict=True)]
+    return [
+        without_reference(take) if found.is_unknown else aligned(take, found.offset_s)
+        for take, found in zip(takes, clock_offsets([_bridged(take) for take in takes]), strict=True)
+    ]
+
+
+def _bridged(take: Take) -> Take:
+    """With angles between those that were left out, as clocks need whole columns."""
+    reference = take.reference.copy()
+    for column in reference.T:
+        known = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(
+                take.reference_time_s[~known], take.reference_time_s[known], column[known]
+            )
+    return replace(take, reference=reference)
 
 
 def fitting(items: Sequence[Item], odd: Sequence[OddTake]) -> list[Item]:

@@ -22,6 +22,10 @@ FEWEST_TAKES, FEWEST_ROWS, MOST_ROWS = 3, 40, 300
 MOST_WITH_PRODUCTS = 6
 """Sensors; of more, lines alone."""
 RIDGE = 1e-5
+TIMES_AS_MANY = 2
+"""Sensors as rotations."""
+SHORTEST_S = 4.0
+"""In a shorter take a slow change is the movement itself."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ def wandering_references(
 ) -> list[Wandering]:
     """The clearest one, or none, by ``usable`` sensors."""
     read = {name: layout.correspondence(name).sensors for name in layout.rotations}
-    if len(takes) < FEWEST_TAKES or len(usable) <= len(layout.rotations):
+    if len(takes) < FEWEST_TAKES or len(usable) < TIMES_AS_MANY * len(layout.rotations):
         return []
     found = []
     for rotation in layout.rotations:
@@ -84,7 +88,10 @@ def _of_rotation(
     found = []
     for number, (by, off, fitted, all_of) in enumerate(slow):
         others = max(each[0] for place, each in enumerate(slow) if place != number)
-        if by >= max(limits.wandering_deg, others) and fitted <= limits.wandering_share * off:
+        if (
+            by >= max(limits.wandering_deg, limits.wandering_times * others)
+            and fitted <= limits.wandering_share * off
+        ):
             found.append(Wandering(places[number], rotation, by, off, all_of, fitted))
     return found
 
@@ -97,7 +104,7 @@ def _rows(
         return None
     angle = take.reference_at_frames([rotation])[:, 0]
     rows = np.flatnonzero(np.isfinite(angle))
-    if len(rows) < FEWEST_ROWS:
+    if len(rows) < FEWEST_ROWS or take.time_s[rows[-1]] - take.time_s[rows[0]] < SHORTEST_S:
         return None
     rows = rows[np.linspace(0, len(rows) - 1, min(MOST_ROWS, len(rows))).astype(int)]
     time = take.time_s[rows]

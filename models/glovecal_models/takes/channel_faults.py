@@ -35,15 +35,16 @@ OTHERS_MOVE = 0.5
 SAME_SHARE, STEPS_WIDE = 0.99, 30
 """Of the frames in which two channels lie within a step of each other, over a range of so many."""
 COPY_SHARE, COPY_FOLLOWS = 0.02, 0.3
-"""Of the range, which the difference of a copy spreads by; and how far that goes along with itself a frame
+"""Of the range, by which the difference from a copy spreads; and how far that goes along with itself a frame
 later, or with the channel."""
-EXCHANGE_TIMES, EXCHANGE_SHARE = 4.0, 0.25
-"""Both channels step by so many times all else they do within a frame, each to within so much of that of where
-the other was."""
-PAUSE_FRAMES = 3.0
-"""After a longer one a channel may be anywhere."""
+EXCHANGE_TIMES, EXCHANGE_SHARE = 2.0, 0.25
+"""Both channels step by so many times all else that they do within a frame, each to within so much of that of
+where the other was."""
+PAUSE_FRAMES, SLOWEST_S = 3.0, 0.1
+"""After a longer pause, and with frames further apart, a channel may be anywhere."""
 LIVES_SHARE, LEAST_MOVED_DEG = 0.3, 10.0
-"""Of its range over all takes, through which a channel goes in a take in which the hand moves; and the joint."""
+"""Of its range over all takes: a channel goes through so much in a take in which the hand moves; and the
+joint."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,10 @@ def _dead(take: Take, takes: Sequence[Take], ranges: np.ndarray) -> list[Channel
         moved = any(_moved(column) >= LEAST_MOVED_DEG for column in angles.T)
         others = np.delete(lives, index)
         never_still = has_lived and _is_never_still(takes, name)
-        if others.any() and others.mean() >= OTHERS_MOVE and (
-            moved if name in take.rotations or not has_lived else never_still
+        if (
+            others.any()
+            and others.mean() >= OTHERS_MOVE
+            and (moved if name in take.rotations or not has_lived else never_still)
         ):
             level = f"{low[index]:g}" if low[index] == high[index] else f"{low[index]:g} or {high[index]:g}"
             found.append(
@@ -131,9 +134,7 @@ def _moves_always(values: np.ndarray, step: float) -> bool:
     return step > 0 and (bool(np.ptp(values) >= FINE_COUNTS * step) or _is_restless(values))
 
 
-def channel_faults(
-    take: Take, ends: tuple[np.ndarray, np.ndarray] | None = None
-) -> tuple[ChannelFault, ...]:
+def channel_faults(take: Take, ends: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[ChannelFault, ...]:
     """In the order of the channels; frames must be in order of time. ``ends`` (S,) of each channel's range;
     None: the take's own."""
     time_s, readings, names = take.time_s, take.readings, take.sensors
@@ -253,7 +254,7 @@ def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -
     for one, other in combinations(range(len(names)), 2):
         row = int(at[one])
         pair = [one, other]
-        if at[other] != row or time_s[row + 1] - time_s[row] > pause:
+        if at[other] != row or time_s[row + 1] - time_s[row] > min(pause, SLOWEST_S):
             continue
         if (height[pair] < EXCHANGE_TIMES * usual[pair]).any():
             continue
@@ -261,5 +262,7 @@ def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -
         if (missed <= EXCHANGE_SHARE * height[pair]).all():
             both = names[one], names[other]
             what = f"exchange their readings at {time_s[row + 1]:.2f} s"
-            found.append(ChannelFault(both, what, "Was a plug moved? Leave out what follows, or record again."))
+            found.append(
+                ChannelFault(both, what, "Was a plug moved? Leave out what follows, or record again.")
+            )
     return found

@@ -225,7 +225,7 @@ def take_warnings(takes: Sequence[Take]) -> list[str]:
 
 
 def sensor_sentences(faults: Sequence[tuple[Take, ChannelFault]]) -> list[str]:
-    """What is wrong with sensors, that the joints did not do; of several takes the first, and how many more."""
+    """What is wrong with sensors, that joints did not do; of several takes the first, and how many more."""
     return alike_once([f"Take {take.name!r}: {fault}. {fault.remedy}" for take, fault in faults])
 
 
