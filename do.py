@@ -22,6 +22,8 @@
                             (needs the shared recordings; a few minutes);
                             study offline: recordings estimated with both directions of time, against live
                             (half an hour);
+                            study planted: faults planted into 20 s of real readings, and what is told of them
+                            (needs the shared recordings; ten minutes; --healthy N: simulated gloves);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (an hour);
@@ -259,6 +261,8 @@ def study(arguments: list[str]) -> int:
         return run("python", "tests/study/new_person.py", *arguments[1:])
     if arguments[:1] == ["offline"]:
         return run("python", "tests/study/offline_study.py", *arguments[1:])
+    if arguments[:1] == ["planted"]:
+        return run("python", "tests/study/planted_study.py", *arguments[1:])
     if arguments[:1] == ["ablation"]:
         return run("python", "tests/study/ablation.py", *arguments[1:])
     if arguments[:1] == ["demos"]:

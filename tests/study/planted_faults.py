@@ -127,22 +127,26 @@ def _some(session: Session, random: np.random.Generator) -> tuple[int, int]:
 
 
 def stuck_for(session: Session, random: np.random.Generator, seconds: float = 2.0) -> Planted:
-    """While its neighbours move at least as much as usual; for two thirds of a take that is shorter."""
+    """While its neighbours move at least as much as usual; of strides so many as last that long."""
     long = [number for number, take in enumerate(session.takes) if take.duration_s > seconds + 0.3]
-    number, (_, sensor) = int(random.choice(long or len(session.takes))), _some(session, random)
+    _, sensor = _some(session, random)
+    name = session.takes[0].sensors[sensor]
+    if not long:
+        first = int(random.integers(len(session.takes) - 1))
+        pair = [
+            _with_readings(take, sensor, np.full(len(take.time_s), session.takes[first].readings[0, sensor]))
+            for take in session.takes[first : first + 2]
+        ]
+        return Planted((*session.takes[:first], *pair, *session.takes[first + 2 :]), (name,))
+    number = int(random.choice(long))
     take = session.takes[number]
-    seconds = min(seconds, take.duration_s * 2 / 3)
     frames = int(np.searchsorted(take.time_s, take.time_s[0] + seconds)) + 1
     moved = np.abs(np.diff(np.delete(take.readings, sensor, axis=1), axis=0)).sum(axis=1)
     sums = np.convolve(moved, np.ones(frames - 1), "valid")
     first = int(random.choice(np.flatnonzero(sums >= np.median(sums))))
     values = take.readings[:, sensor].copy()
     values[first : first + frames] = values[first]
-    return Planted(
-        _changed(session.takes, number, _with_readings(take, sensor, values)),
-        (take.sensors[sensor],),
-        take.name,
-    )
+    return Planted(_changed(session.takes, number, _with_readings(take, sensor, values)), (name,), take.name)
 
 
 def stuck_on(session: Session, random: np.random.Generator) -> Planted:
@@ -265,7 +269,7 @@ def somebody_else(session: Session, random: np.random.Generator) -> Planted:
 
 
 FAULTS: dict[str, tuple[Plant, str]] = {
-    "stuck for 2 s": (stuck_for, "reads .* from|stands still"),
+    "stuck for 2 s": (stuck_for, "reads .* from|stands still|always"),
     "stuck for ever": (stuck_on, "reads .* from|stands still|always"),
     "clipped": (clipped, "cut off|end stop"),
     "dead": (dead, "always|only .* or "),

@@ -43,6 +43,7 @@ VERBS = (
     "study",
     "study active",
     "study offline",
+    "study planted",
     "fresh",
     "containers",
     "sbom",
@@ -165,6 +166,10 @@ def test_study_of_recordings_tells_what_a_delay_buys(smoke) -> None:
     curve = r"noise alone \|(?: [\d.]+ \|){3} ([\d.]+) (?:\| [\d.]+ ){2}\| [\d.]+ to [\d.]+ %"
     at_100_ms = said.number(curve)
     assert offline <= at_100_ms < live
+
+
+def test_study_of_planted_faults_tells_nothing_of_a_healthy_glove(smoke) -> None:
+    assert smoke["study planted"].result().number(r"simulated, healthy \|[ |]* (\d+) of 1 ") == 0
 
 
 def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> None:

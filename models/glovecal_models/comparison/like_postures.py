@@ -27,8 +27,12 @@ FEWEST_ROWS = 8
 FEWEST_OTHERS = 2
 ALIKE_DEG, ALIKE_SHARE = 3.0, 0.1
 """Angles alike, in degrees and of the standard deviation over all takes."""
-MOST_ROTATIONS = 6
-"""Of more, hardly any two postures are alike in all."""
+MOST_ROTATIONS, MOST_EXCHANGED = 6, 3
+"""Of more, hardly any two postures are alike in all; and some pair of rotations fits by chance."""
+LEAST_SPREAD_DEG = 3.0
+"""Of a hand that moves less within takes, readings tell the hand's rest."""
+ONE_IS_ENOUGH = 0.25
+"""Times the share that exchanging may leave: then one other take is enough, which others agree with."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,8 @@ class _Wearing:
         return cls(living, tuple(measured), parts, spread[alive], alike, usual)
 
     def unlike(self, limits: ComparisonLimits) -> Unlike | None:
-        if not (len(self.sensors) > 1 and 0 < len(self.rotations) <= MOST_ROTATIONS):
+        few = len(self.sensors) > 1 and 0 < len(self.rotations) <= MOST_ROTATIONS
+        if not few or self.spread_deg < LEAST_SPREAD_DEG:
             return None
         for asked in (self._sensors, self._rotations, self._levels):
             far = (item for item in asked(limits) if item[1].off_deg >= limits.odd_least_deg)
@@ -127,8 +132,8 @@ class _Wearing:
         """``order``: of the first take's rotations."""
         (x, y), (u, v) = self.parts[one], self.parts[other]
         y = y if order is None else y[:, order]
-        near = (np.abs(y[:, None] - v[None]) <= self.alike_deg).all(axis=2)
-        has = near.any(axis=1)
+        near: np.ndarray = np.all(np.abs(y[:, None] - v[None]) <= self.alike_deg, axis=-1)
+        has: np.ndarray = np.any(near, axis=-1)
         if has.sum() < FEWEST_ROWS:
             return None
         theirs = near[has] @ u / near[has].sum(axis=1, keepdims=True)
@@ -155,8 +160,9 @@ class _Wearing:
         for place in range(len(self.parts)):
             others = [value for (one, _), value in self.squares.items() if one == place]
             usual = self._of_others(place)
-            if len(others) < FEWEST_OTHERS or not len(usual):
+            if not others or not len(usual):
                 continue
+            share = limits.exchanged_share * (1.0 if len(others) >= FEWEST_OTHERS else ONE_IS_ENOUGH)
             for a, b in combinations(range(len(self.sensors)), 2):
                 own = np.array([each[a, a] + each[b, b] for each in others])
                 exchanged = np.array([each[a, b] + each[b, a] for each in others])
@@ -166,7 +172,7 @@ class _Wearing:
                 least = limits.exchanged_times * float(np.median(pair))
                 off, fitted = float(np.median(own)), float(np.median(exchanged))
                 if (
-                    np.median(left) <= limits.exchanged_share
+                    np.median(left) <= share
                     and (left < 1.0).all()
                     and fitted <= least <= off
                     and self._fit_without((a, b), place, limits)
@@ -182,9 +188,9 @@ class _Wearing:
         return not len(own) or float(own.mean()) <= limits.exchanged_times * float(usual.mean())
 
     def _rotations(self, limits: ComparisonLimits) -> Iterator[tuple[float, Unlike]]:
-        """The same of reference columns; in no other take they would fit as well."""
+        """The same of reference columns, which no other take wants exchanged as well."""
         count = range(len(self.parts))
-        for place in count:
+        for place in count if len(self.rotations) <= MOST_EXCHANGED else ():
             usual = self._of_others(place)
             if not len(usual):
                 continue
@@ -198,7 +204,11 @@ class _Wearing:
                 if left > limits.exchanged_share * off or left > (most if np.isfinite(off) else typical):
                     continue
                 theirs = [self._reordered(other, order, place) for other in count if other != place]
-                if all(fits is None or fits >= own for own, fits in theirs):
+                if not any(
+                    fits is not None and fits <= limits.exchanged_share * own
+                    for own, fits in theirs
+                    if np.isfinite(own)
+                ):
                     names, told = (self.rotations[a], self.rotations[b]), off if np.isfinite(off) else 1.0
                     degrees = [self._degrees(each) for each in (told, most, left)]
                     yield left / off, Unlike(place, "rotations", names, *degrees)
