@@ -20,16 +20,16 @@ from glovecal_models.comparison.limits import ComparisonLimits
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-MOST_ROWS = 120
+MOST_POSTURES = 120
 """Of a take, evenly."""
-FEWEST_ROWS = 8
+FEWEST_LIKE_ROWS = 8
 """Of a take that stand like rows of another."""
 FEWEST_OTHERS = 2
-ALIKE_DEG, ALIKE_SHARE = 3.0, 0.1
+ALIKE_ANGLE_DEG, ALIKE_ANGLE_SHARE = 3.0, 0.1
 """Angles alike, in degrees and of the standard deviation over all takes."""
-MOST_ROTATIONS, MOST_EXCHANGED = 6, 3
+MOST_HELD_ALIKE, MOST_EXCHANGED = 6, 3
 """Of more, hardly any two postures are alike in all; and some pair of rotations fits by chance."""
-LEAST_SPREAD_DEG = 3.0
+LEAST_MOVED_WITHIN_DEG = 3.0
 """Of a hand that moves less within takes, readings tell the hand's rest."""
 ONE_IS_ENOUGH = 0.25
 """Times the share that exchanging may leave: then one other take is enough, which others agree with."""
@@ -105,13 +105,13 @@ class _Wearing:
         angles = np.concatenate([y for _, y in parts])
         moved = angles.std(axis=0) if len(angles) else np.zeros(len(measured))
         within = np.concatenate([y - y.mean(axis=0) if len(y) else y for _, y in pairs])
-        alike = np.maximum(ALIKE_DEG, ALIKE_SHARE * moved)
+        alike = np.maximum(ALIKE_ANGLE_DEG, ALIKE_ANGLE_SHARE * moved)
         usual = float(np.sqrt(np.mean(within**2))) if within.size else 0.0
         return cls(living, tuple(measured), parts, spread[alive], alike, usual)
 
     def unlike(self, limits: ComparisonLimits) -> Unlike | None:
-        few = len(self.sensors) > 1 and 0 < len(self.rotations) <= MOST_ROTATIONS
-        if not few or self.spread_deg < LEAST_SPREAD_DEG:
+        few = len(self.sensors) > 1 and 0 < len(self.rotations) <= MOST_HELD_ALIKE
+        if not few or self.spread_deg < LEAST_MOVED_WITHIN_DEG:
             return None
         for asked in (self._sensors, self._rotations, self._levels):
             far = (item for item in asked(limits) if item[1].off_deg >= limits.odd_least_deg)
@@ -134,7 +134,7 @@ class _Wearing:
         y = y if order is None else y[:, order]
         near: np.ndarray = np.all(np.abs(y[:, None] - v[None]) <= self.alike_deg, axis=-1)
         has: np.ndarray = np.any(near, axis=-1)
-        if has.sum() < FEWEST_ROWS:
+        if has.sum() < FEWEST_LIKE_ROWS:
             return None
         theirs = near[has] @ u / near[has].sum(axis=1, keepdims=True)
         return ((x[has][:, :, None] - theirs[:, None, :]) ** 2).mean(axis=0)
@@ -253,5 +253,5 @@ class _Wearing:
 def _some(take: Take, sensors: Sequence[str], rotations: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     angles = take.reference_at_frames(rotations)
     rows = np.flatnonzero(np.isfinite(angles).all(axis=1)) if rotations else np.empty(0, int)
-    rows = rows[np.linspace(0, len(rows) - 1, min(MOST_ROWS, len(rows))).astype(int)]
+    rows = rows[np.linspace(0, len(rows) - 1, min(MOST_POSTURES, len(rows))).astype(int)]
     return take.readings[rows][:, [take.sensors.index(name) for name in sensors]], angles[rows]

@@ -18,13 +18,13 @@ from glovecal_models.comparison.limits import ComparisonLimits
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 
-FEWEST_TAKES, FEWEST_ROWS, MOST_ROWS = 3, 40, 300
+FEWEST_TAKES, FEWEST_SLOW_ROWS, MOST_SLOW_ROWS = 3, 40, 300
 MOST_WITH_PRODUCTS = 6
 """Sensors; of more, lines alone."""
-RIDGE = 1e-5
+SLOW_RIDGE = 1e-5
 TIMES_AS_MANY = 2
 """Sensors as rotations."""
-SHORTEST_S = 4.0
+SHORTEST_SLOW_S = 4.0
 """In a shorter take a slow change is the movement itself."""
 
 
@@ -72,7 +72,7 @@ def _of_rotation(
     of = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
     time, x, angle = (np.concatenate(column) for column in zip(*parts, strict=True))
     columns = np.column_stack([_shapes(x), *((of == each).astype(float) for each in range(len(parts)))])
-    square = columns.T @ columns + RIDGE * len(columns) * np.eye(columns.shape[1])
+    square = columns.T @ columns + SLOW_RIDGE * len(columns) * np.eye(columns.shape[1])
 
     def left(values: np.ndarray) -> np.ndarray:
         return values - columns @ np.linalg.solve(square, columns.T @ values)
@@ -104,9 +104,9 @@ def _rows(
         return None
     angle = take.reference_at_frames([rotation])[:, 0]
     rows = np.flatnonzero(np.isfinite(angle))
-    if len(rows) < FEWEST_ROWS or take.time_s[rows[-1]] - take.time_s[rows[0]] < SHORTEST_S:
+    if len(rows) < FEWEST_SLOW_ROWS or take.time_s[rows[-1]] - take.time_s[rows[0]] < SHORTEST_SLOW_S:
         return None
-    rows = rows[np.linspace(0, len(rows) - 1, min(MOST_ROWS, len(rows))).astype(int)]
+    rows = rows[np.linspace(0, len(rows) - 1, min(MOST_SLOW_ROWS, len(rows))).astype(int)]
     time = take.time_s[rows]
     readings = take.readings[rows][:, [take.sensors.index(name) for name in sensors]]
     return 2 * (time - time[0]) / (time[-1] - time[0]) - 1, readings, angle[rows]
