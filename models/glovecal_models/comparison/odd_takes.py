@@ -14,13 +14,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from glovecal_models.comparison.like_postures import Unlike, unlike_takes
+from glovecal_models.comparison.like_postures import (
+    FEWEST_TAKES,
+    OTHER_LEVEL,
+    How,
+    OddTake,
+    Unlike,
+    unlike_takes,
+    wandering_references,
+)
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
-from glovecal_models.comparison.wandering_reference import wandering_references
 from glovecal_models.layout import Layout
 from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.clock_scan import (
@@ -33,7 +40,6 @@ from glovecal_models.takes.clock_scan import (
 )
 from glovecal_models.takes.take import Take
 
-FEWEST_TAKES = 3
 FEWEST_TELLING_ROWS = 60
 MOST_COMPARED_ROWS = 1500
 """Of a longer take every second, third ... row."""
@@ -45,64 +51,8 @@ KEPT = 0.9
 """An assignment must save so much more than a column's own place; cycles that do not are put back."""
 
 Item = TypeVar("Item")
-How = Literal[
-    "shift", "signs", "sensors", "rotations", "columns", "gains", "own map", "level", "wandering", "nothing"
-]
-OTHER_LEVEL = "Its readings lie elsewhere at the same angles. Another person, another glove, or another zero?"
 UNEXPLAINED = 0.1
 """Share of the reference's variance: where readings leave more of most takes, their clocks are looked at."""
-
-
-@dataclass(frozen=True)
-class OddTake:
-    """A take that does not fit the others."""
-
-    place: int
-    """Of the take among those that were looked at."""
-    take: str
-    error_deg: float
-    """Of a line through the other takes, RMS over rotations, offsets taken away."""
-    usual_deg: float
-    """The same of the other takes, at most."""
-    how: How
-    """What makes it fit."""
-    fitted_deg: float
-    """Its error then."""
-    change: str
-    """What makes it fit, as a part of a sentence."""
-    in_like_postures: bool = False
-    """Whether errors are of readings where joints stand alike, as degrees that move them as far; else of a
-    line."""
-
-    @property
-    def sentence(self) -> str:
-        start = f"Take {self.take!r} does not fit the others: "
-        if self.how == "wandering":
-            return f"{start}{self.change}"
-        if self.in_like_postures:
-            start += (
-                f"where joints stand alike, its readings are as far from theirs as {self.error_deg:.1f}"
-                f" degrees move them; theirs are at most {self.usual_deg:.1f} apart."
-            )
-        else:
-            start += (
-                f"{self.error_deg:.1f} degrees off a line through them, which are at most"
-                f" {self.usual_deg:.1f} off."
-            )
-        if self.how == "nothing":
-            return f"{start} No change of columns, signs, gains or clock makes it fit."
-        if self.how == "level":
-            return f"{start} {self.change}"
-        return f"{start} {self.change}; {self.fitted_deg:.1f} degrees then."
-
-    @property
-    def is_set_aside(self) -> bool:
-        """A clock is repaired where it is found, by whoever asked: its take stays."""
-        return self.how != "shift"
-
-    @property
-    def told(self) -> str:
-        return f"{self.sentence} It is set aside." if self.is_set_aside else self.sentence
 
 
 def odd_takes(
@@ -142,20 +92,20 @@ def _in_like_postures(takes: Sequence[Take], layout: Layout, limits: ComparisonL
     """Those that other takes of their wearing contradict, and one whose reference wanders."""
     faulty = {name for _, fault in session_faults(takes, layout.sensors) for name in fault.channels}
     sensors, takes = [name for name in layout.sensors if name not in faulty], _on_one_clock(takes)
-    found = [_unlike(item, takes[item.place]) for item in unlike_takes(takes, sensors, layout, limits)]
-    places = [place for place in range(len(takes)) if place not in {item.place for item in found}]
+    odd = [_unlike(item, takes[item.place]) for item in unlike_takes(takes, sensors, layout, limits)]
+    places = [place for place in range(len(takes)) if place not in {item.place for item in odd}]
     for item in wandering_references([takes[place] for place in places], sensors, layout, limits):
         place = places[item.place]
         change = (
             f"the reference of {item.rotation} wanders by {item.by_deg:.0f} degrees in the course of the take"
             " while the sensors do not. Did a marker slip? Record it again."
         )
-        found.append(
+        odd.append(
             OddTake(
                 place, takes[place].name, item.off_deg, item.usual_deg, "wandering", item.fitted_deg, change
             )
         )
-    return found
+    return odd
 
 
 def _unlike(item: Unlike, take: Take) -> OddTake:
@@ -173,8 +123,8 @@ def _on_one_clock(takes: Sequence[Take]) -> Sequence[Take]:
     if not left or not np.nanmedian(left) > UNEXPLAINED:
         return takes
     return [
-        without_reference(take) if found.is_unknown else aligned(take, found.offset_s)
-        for take, found in zip(takes, clock_offsets([_bridged(take) for take in takes]), strict=True)
+        without_reference(take) if odd.is_unknown else aligned(take, odd.offset_s)
+        for take, odd in zip(takes, clock_offsets([_bridged(take) for take in takes]), strict=True)
     ]
 
 

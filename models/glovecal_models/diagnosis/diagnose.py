@@ -38,7 +38,6 @@ from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.take import Take
-from glovecal_models.takes.take_check import sensor_sentences
 
 
 def diagnose(
@@ -73,12 +72,11 @@ def diagnose(
             found_before=found_before, seed=seed, limits=limits, cancelled=cancelled, report=report,
         ),
     )  # fmt: skip
-    told = tuple(sensor_sentences(faults))
     if are_pose_labels(takes):
-        return replace(_of_pose_labels(begun), sensor_problems=told)
+        return replace(_of_pose_labels(begun), sensor_faults=faults)
     *_, ended = states(begun)
     begun.question.progress("done", 1.0)
-    return replace(concluded(ended), sensor_problems=told)
+    return replace(concluded(ended), sensor_faults=faults)
 
 
 def asked(takes: Sequence[Take], layout: Layout, choices: Choices) -> State:

@@ -19,6 +19,9 @@ from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect, kind_of
 from glovecal_models.effects.base.findings import Finding
 from glovecal_models.effects.catalogue import relations
+from glovecal_models.takes.channel_faults import ChannelFault
+from glovecal_models.takes.take import Take
+from glovecal_models.takes.take_check import sensor_sentences
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +38,8 @@ class Diagnosis:
     """Every identifiable effect."""
     not_identifiable: tuple[NotIdentifiable, ...]
     reference_problems: tuple[str, ...]
-    sensor_problems: tuple[str, ...] = ()
-    """Faults that readings show by themselves; rotations are read from other sensors where there are any."""
+    sensor_faults: tuple[tuple[Take, ChannelFault], ...] = ()
+    """Those that readings show by themselves; rotations are read from other sensors where there are any."""
     findings: tuple[Finding, ...]
     """What is known by a signature in the recording."""
     signature: tuple[Finding, ...] = ()
@@ -59,6 +62,11 @@ class Diagnosis:
     """What is the reference's own, where it states deviations; None where it states none."""
     decided: tuple[Decision, ...] = ()
     """Which rules changed something, in their order."""
+
+    @property
+    def sensor_problems(self) -> tuple[str, ...]:
+        """Sentences on ``sensor_faults``."""
+        return tuple(sensor_sentences(self.sensor_faults))
 
     @property
     def ranked_assessments(self) -> list[Assessment]:

@@ -13,8 +13,9 @@ from glovecal_models.calibration.training_settings import (
     repaired_takes,
     requested_effects,
 )
+from glovecal_models.comparison.like_postures import OddTake
 from glovecal_models.comparison.noise_floor import rotation_noise
-from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
+from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis

@@ -8,7 +8,7 @@ from dataclasses import replace
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.text import model_effect
 from glovecal_models.comparison.floor_estimate import NoiseFloor
-from glovecal_models.comparison.odd_takes import OddTake
+from glovecal_models.comparison.like_postures import OddTake
 from glovecal_models.diagnosis.actions import Action, together
 from glovecal_models.diagnosis.answer import (
     NOTHING_NAMED,

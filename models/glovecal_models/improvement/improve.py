@@ -26,8 +26,9 @@ from glovecal_models.calibration.unseen_wearing import unseen_wearing
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
+from glovecal_models.comparison.like_postures import OddTake
 from glovecal_models.comparison.noise_floor import noise_floors
-from glovecal_models.comparison.odd_takes import OddTake, fitting, odd_takes
+from glovecal_models.comparison.odd_takes import fitting, odd_takes
 from glovecal_models.comparison.residuals import residuals
 from glovecal_models.diagnosis.actions import Action
 from glovecal_models.diagnosis.diagnosis import Diagnosis

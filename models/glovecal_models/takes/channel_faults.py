@@ -71,17 +71,17 @@ def session_faults(
     takes = [_with_sensors(take, names) for take in takes]
     low = np.min([take.readings.min(axis=0) for take in takes], axis=0)
     high = np.max([take.readings.max(axis=0) for take in takes], axis=0)
-    found = []
+    faults = []
     for take in takes:
         dead = _dead(take, takes, high - low)
-        found += [(take, fault) for fault in dead]
+        faults += [(take, fault) for fault in dead]
         gone = {name for fault in dead for name in fault.channels}
-        found += [
+        faults += [
             (take, fault)
             for fault in channel_faults(take, (low, high))
             if not gone.intersection(fault.channels)
         ]
-    return tuple(found)
+    return tuple(faults)
 
 
 def _with_sensors(take: Take, names: tuple[str, ...]) -> Take:
@@ -98,7 +98,7 @@ def _dead(take: Take, takes: Sequence[Take], ranges: np.ndarray) -> list[Channel
     if not two.any() or len(take.time_s) < STUCK_FRAMES:
         return []
     lives = (high - low >= LIVES_SHARE * ranges) & ~two
-    found = []
+    faults = []
     for index in np.flatnonzero(two):
         name = take.sensors[index]
         has_lived = ranges[index] > high[index] - low[index]
@@ -114,10 +114,10 @@ def _dead(take: Take, takes: Sequence[Take], ranges: np.ndarray) -> list[Channel
             and (moved if name in take.rotations or not has_lived else never_still)
         ):
             level = f"{low[index]:g}" if low[index] == high[index] else f"{low[index]:g} or {high[index]:g}"
-            found.append(
+            faults.append(
                 ChannelFault((name,), f"is dead: always {level} while others move", "Is its wire broken?")
             )
-    return found
+    return faults
 
 
 def _moved(angles: np.ndarray) -> float:
@@ -250,7 +250,7 @@ def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -
     rest[at, np.arange(len(names))] = 0.0
     height, usual = steps.max(axis=0), rest.max(axis=0)
     pause = PAUSE_FRAMES * float(np.median(np.diff(time_s)))
-    found = []
+    faults = []
     for one, other in combinations(range(len(names)), 2):
         row = int(at[one])
         pair = [one, other]
@@ -262,7 +262,7 @@ def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -
         if (missed <= EXCHANGE_SHARE * height[pair]).all():
             both = names[one], names[other]
             what = f"exchange their readings at {time_s[row + 1]:.2f} s"
-            found.append(
+            faults.append(
                 ChannelFault(both, what, "Was a plug moved? Leave out what follows, or record again.")
             )
-    return found
+    return faults
