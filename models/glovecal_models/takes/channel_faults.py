@@ -256,7 +256,7 @@ def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -
         pair = [one, other]
         if at[other] != row or time_s[row + 1] - time_s[row] > min(pause, SLOWEST_S):
             continue
-        if (height[pair] < EXCHANGE_TIMES * usual[pair]).any():
+        if (height[pair] <= EXCHANGE_TIMES * usual[pair]).any():
             continue
         missed = np.abs(readings[row + 1, pair] - readings[row, pair[::-1]])
         if (missed <= EXCHANGE_SHARE * height[pair]).all():
