@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.diagnosis.text import diagnosis_sentences
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
@@ -142,7 +142,7 @@ def test_a_diagnosis_tells_what_readings_show_first_and_reads_the_others() -> No
     takes[1] = replace(takes[1], readings=readings)
     takes = [replace(take, sensors=tuple(f"S{each}" for each in range(len(plan.sensors)))) for take in takes]
     layout = Layout.from_columns("unknown", takes[0].sensors, takes[0].rotations)
-    found = diagnose(takes, layout, effects=())
+    found = ModelOnTakes(tuple(takes), layout).diagnosed(effects=())
     [sentence] = found.sensor_problems
     assert sentence.startswith(f"Take {takes[1].name!r}: S{number} reads")
     assert diagnosis_sentences(found)[0] == sentence

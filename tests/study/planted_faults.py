@@ -16,7 +16,7 @@ import numpy as np
 from glove_choices import few_takes
 
 from glovecal_models.comparison.odd_takes import fitting, odd_takes
-from glovecal_models.diagnosis.diagnose import diagnose
+from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
 from glovecal_models.layout import Layout
 from glovecal_models.takes.reference_jumps import without_jumps
 from glovecal_models.takes.table import read_takes
@@ -290,7 +290,8 @@ def told(takes: Sequence[Take], layout: Layout, *, linear: bool = True) -> tuple
     takes = [without_jumps(take) for take in takes]
     sentences = [*excluded_sentences(takes), *(each for take in takes for each in take_warnings([take]))]
     odd = odd_takes(takes, layout)
-    found = diagnose(fitting(takes, odd), layout, linear=linear, judge_residual=False)
+    fitted = ModelOnTakes(tuple(fitting(takes, odd)), layout, linear)
+    found = fitted.diagnosed(judge_residual=False)
     sentences += [item.told for item in odd]
     sentences += [
         *found.sensor_problems,

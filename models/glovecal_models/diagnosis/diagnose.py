@@ -36,7 +36,6 @@ from glovecal_models.effects.base.relations import Motion
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
-from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.take import Take
 
 
@@ -62,10 +61,9 @@ def diagnose(
 
     Raises BadInput, Cancelled.
     """
-    faults = session_faults(takes, layout.sensors)
     begun = asked(
         takes,
-        layout.read_without({name for _, fault in faults for name in fault.channels}),
+        layout,
         Choices(
             linear=linear, known=tuple(known), effects=None if effects is None else tuple(effects),
             signatures=signatures, judge_residual=judge_residual, own=tuple(own), noise_floors=noise_floors,
@@ -73,10 +71,10 @@ def diagnose(
         ),
     )  # fmt: skip
     if are_pose_labels(takes):
-        return replace(_of_pose_labels(begun), sensor_faults=faults)
+        return _of_pose_labels(begun)
     *_, ended = states(begun)
     begun.question.progress("done", 1.0)
-    return replace(concluded(ended), sensor_faults=faults)
+    return concluded(ended)
 
 
 def asked(takes: Sequence[Take], layout: Layout, choices: Choices) -> State:

@@ -23,6 +23,7 @@ from glovecal_models.diagnosis.known_effect import KnownEffect, known_effects
 from glovecal_models.effects.base.effect import Effect
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report
+from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.take import Take
 
 
@@ -65,10 +66,12 @@ class ModelOnTakes:
         return replace(self, known=tuple(item for item in self.known if item.effect.name not in names))
 
     def diagnosed(self, **choices: Any) -> Diagnosis:
-        """``choices`` as of ``diagnose``. Raises BadInput, Cancelled."""
-        return diagnose(
-            self.takes, self.layout, linear=self.linear, known=self.known, own=self.own, **choices
-        )
+        """What readings show by themselves comes first: rotations are read from other sensors where there are
+        any. ``choices`` as of ``diagnose``. Raises BadInput, Cancelled."""
+        faults = session_faults(self.takes, self.layout.sensors)
+        layout = self.layout.read_without({name for _, fault in faults for name in fault.channels})
+        found = diagnose(self.takes, layout, linear=self.linear, known=self.known, own=self.own, **choices)
+        return replace(found, sensor_faults=faults)
 
 
 @dataclass(frozen=True)
