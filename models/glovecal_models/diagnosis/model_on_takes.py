@@ -70,8 +70,8 @@ class ModelOnTakes:
         any. ``choices`` as of ``diagnose``. Raises BadInput, Cancelled."""
         faults = session_faults(self.takes, self.layout.sensors)
         layout = self.layout.read_without({name for _, fault in faults for name in fault.channels})
-        found = diagnose(self.takes, layout, linear=self.linear, known=self.known, own=self.own, **choices)
-        return replace(found, sensor_faults=faults)
+        choices |= {"linear": self.linear, "known": self.known, "own": self.own}
+        return replace(diagnose(self.takes, layout, **choices), sensor_faults=faults)
 
 
 @dataclass(frozen=True)

@@ -104,13 +104,13 @@ def some_verbs(names: Sequence[str] = tuple(VERBS)) -> typer.Typer:
     for name in names:
         panel, place, attribute, form = VERBS[name]
         module = import_module(f"glovecal_service.cli.{place}")
-        found = getattr(module, attribute)
+        written = getattr(module, attribute)
         if not name:
-            found(app, panel)
-        elif isinstance(found, typer.Typer):
-            app.add_typer(found, name=name, rich_help_panel=panel)
+            written(app, panel)
+        elif isinstance(written, typer.Typer):
+            app.add_typer(written, name=name, rich_help_panel=panel)
         else:
-            app.command(name, cls=getattr(module, form) if form else None, rich_help_panel=panel)(found)
+            app.command(name, cls=getattr(module, form) if form else None, rich_help_panel=panel)(written)
     return app
 
 
