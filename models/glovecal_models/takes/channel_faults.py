@@ -34,9 +34,10 @@ OTHERS_MOVE = 0.5
 """Share of the other channels that change in most of the frames meanwhile."""
 SAME_SHARE, STEPS_WIDE = 0.99, 30
 """Of the frames in which two channels lie within a step of each other, over a range of so many."""
-COPY_SHARE, COPY_FOLLOWS = 0.02, 0.3
-"""Of the range, by which the difference from a copy spreads; and how far that goes along with itself a frame
-later, or with the channel."""
+COPY_SHARE, COPY_FOLLOWS, COPY_SHAKES = 0.02, 0.3, 0.3
+"""Of the range, by which the difference from a copy spreads; how far that goes along with itself a frame
+later, or with the channel; and the least correlation of what no movement is so quick to make: sensors that
+one bend moves alike have each its own."""
 EXCHANGE_TIMES, EXCHANGE_SHARE = 2.0, 0.25
 """Both channels step by so many times all else that they do within a frame, each to within so much of that of
 where the other was."""
@@ -237,7 +238,11 @@ def _is_copy(values: np.ndarray, apart: np.ndarray) -> bool:
         return True
     later = float(away[1:] @ away[:-1]) / whole
     along = float(away @ own) / np.sqrt(whole * float(own @ own))
-    return max(abs(later), abs(along)) <= COPY_FOLLOWS
+    if max(abs(later), abs(along)) > COPY_FOLLOWS:
+        return False
+    one, other = np.diff(values, 3), np.diff(values - apart, 3)
+    both = np.sqrt(float(one @ one) * float(other @ other))
+    return both > 0 and float(one @ other) >= COPY_SHAKES * both
 
 
 def _exchanged(time_s: np.ndarray, readings: np.ndarray, names: Sequence[str]) -> list[ChannelFault]:
