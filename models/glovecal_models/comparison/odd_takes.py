@@ -129,7 +129,8 @@ def _on_one_clock(takes: Sequence[Take]) -> Sequence[Take]:
 
 
 def _bridged(take: Take) -> Take:
-    """With angles between those that were left out, as clocks need whole columns."""
+    """With angles between those that were left out, as clocks need whole columns; nobody states a deviation
+    of these."""
     reference = take.reference.copy()
     for column in reference.T:
         known = np.isfinite(column)
@@ -137,7 +138,7 @@ def _bridged(take: Take) -> Take:
             column[~known] = np.interp(
                 take.reference_time_s[~known], take.reference_time_s[known], column[known]
             )
-    return replace(take, reference=reference)
+    return replace(take, reference=reference, reference_sd=None)
 
 
 def fitting(items: Sequence[Item], odd: Sequence[OddTake]) -> list[Item]:

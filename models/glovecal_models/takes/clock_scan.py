@@ -232,8 +232,8 @@ def _all_rotations(grid: Grid, offset_s: float) -> np.ndarray:
 def _map(rows: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     """Ridge-linear map of the wearing's sensors: coefficients (1 + S, R) for standardised readings, scale."""
     x, y = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    scale = np.maximum(x.std(axis=0), 1e-9)
-    scale[0] = 1.0
+    scale = x.std(axis=0)
+    scale[scale < 1e-9] = 1.0  # the one, and what never moves
     x = x / scale
     return np.linalg.solve(x.T @ x + RIDGE * len(x) * np.eye(x.shape[1]), x.T @ y), scale
 

@@ -9,6 +9,7 @@ import pytest
 
 from glovecal_models.comparison.odd_takes import odd_takes
 from glovecal_models.layout import Layout
+from glovecal_models.takes.channel_faults import session_faults
 from glovecal_models.takes.take import Take
 
 SENSORS, ROTATIONS = ("A", "B", "C", "D"), ("R", "Q")
@@ -84,3 +85,44 @@ def test_two_of_four_tell_nobody_which_is_right() -> None:
     for number in (1, 2):
         takes[number] = replace(takes[number], readings=takes[number].readings[:, [0, 3, 2, 1]])
     assert [item for item in odd_takes(takes, LAYOUT) if item.in_like_postures] == []
+
+
+def of_rows(take: Take, frames: int, rows: int) -> Take:
+    """The first ones."""
+    return replace(
+        take, time_s=take.time_s[:frames], readings=take.readings[:frames],
+        reference_time_s=take.reference_time_s[:rows], reference=take.reference[:rows],
+    )  # fmt: skip
+
+
+def with_gaps(take: Take) -> Take:
+    """Measured by a source that states deviations, and leaves angles out."""
+    reference = take.reference.copy()
+    reference[30:90, 0] = reference[100:180, 1] = np.nan
+    return replace(take, reference=reference, reference_sd=np.where(np.isfinite(reference), 0.5, np.nan))
+
+
+def unmeasured(take: Take) -> Take:
+    return replace(take, reference=np.full_like(take.reference, np.nan))
+
+
+PECULIAR = {
+    "no frame": lambda take: of_rows(take, 0, 0),
+    "one frame": lambda take: of_rows(take, 1, 1),
+    "two frames": lambda take: of_rows(take, 2, 2),
+    "no row of the reference": lambda take: of_rows(take, 240, 0),
+    "no angle measured": unmeasured,
+    "gaps, and deviations": with_gaps,
+    "all sensors stand": lambda take: replace(take, readings=np.full_like(take.readings, 500.0)),
+}
+
+
+@pytest.mark.parametrize("late_s", [0.0, -0.6], ids=["one clock", "another clock"])
+@pytest.mark.parametrize("how_many", [1, 4])
+@pytest.mark.parametrize("name", PECULIAR)
+def test_whatever_a_take_may_be_ends_in_an_answer(name: str, how_many: int, late_s: float) -> None:
+    takes = session(late_s)
+    takes[:how_many] = [PECULIAR[name](take) for take in takes[:how_many]]
+    odd = [item for item in odd_takes(takes, LAYOUT) if item.is_set_aside]
+    assert len(odd) < len(takes) / 2
+    assert all(str(fault) for _, fault in session_faults(takes, SENSORS))
