@@ -22,16 +22,17 @@ posture, or a reference that wanders slowly. A cause is hidden in it in one of s
 gets the takes and the layout. Every second glove has five bends of fingers, the others five joints drawn \
 from the whole hand. Sizes are multiples of the noise floor.
 
-Open forms were there while the diagnosis was made. Set-aside forms were written by two authors who saw \
-neither diagnosis nor limits; hashes were committed first. One, who saw no other form, wrote what is to be \
-met most often in a real glove: by the judgement of a third reader 39 of those 57 have the law of an open \
-form in another hand, and 18 are near relatives. The \
-other was told the laws of all forms there are and had to find other ones that one may really meet. Both \
-have been asked by several states of the programs since, and their figures read, so that they prove less \
-than at first. The parts below tell both apart. The clean twin is the same glove without the cause: a \
-sensor that lost the angle cannot be brought back to it. So the ceiling is asked of each repaired glove \
-that stays above 1.1 times its twin: "none" means that a black box on all that was recorded finds nothing \
-more.
+Open forms were there while the diagnosis was made. Set-aside forms were written by an author who saw \
+neither diagnosis nor limits nor any other form; their hashes were committed first, on 2026-11-28, and they \
+were asked once since: 90.7 % named first at 1.3 floors (98 of 108 gloves; 83.8 to 94.9 %), the truth in \
+the set of 91.7 % at 0.65 (99 of 108; 84.9 to 95.6 %), 87.0 % named first at 2.6 (94 of 108). Nearly half \
+of the misses are latencies that change with the movement or in the course of time, named as clocks that \
+disagree or as hysteresis; next come saturation named as a failing sensor, and moisture that is not named. \
+Two of the 57 laws were among the open or earlier ones too, by their names. Figures of set-aside forms \
+below that are older are of the forms of two earlier authors, which several states of the programs were \
+asked for. The clean twin is the same glove without the cause: a sensor that lost the angle cannot be \
+brought back to it. So the ceiling is asked of each repaired glove that stays above 1.1 times its twin: \
+"none" means that a black box on all that was recorded finds nothing more.
 """
 FOLDER = "pictures"
 FORMS = ("open forms", "set-aside forms")
