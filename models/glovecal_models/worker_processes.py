@@ -28,11 +28,10 @@ import sys
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, BinaryIO, TypeVar
@@ -117,39 +116,27 @@ def side_by_side(
     work: Callable[[Task, Cancel | None], Result], tasks: Sequence[Task], cancelled: Cancel | None = None
 ) -> Iterator[Result]:
     """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` that ``cancelled`` brings.
-
-    These begin at once, while the caller may do something else; the last tasks, where they are too few for
-    all workers, are done by this process, too. Where there are no workers it does each when it is asked for.
+    Where there are none this process does it, each when it is asked for.
 
     ``work`` as in ``work_off``; it is also told when to stop, unless in a worker, which is ended. Whoever
     asks for no further result leaves the rest undone. Raises Cancelled, WorkerDied, and of what ``work``
     raises the error of the first task.
     """
-    if not isinstance(cancelled, _CancelWithPool) or len(tasks) < 2:
-        return (work(task, cancelled) for task in tasks)
-    here = partial(_result_or_error_here, work, cancelled.cancelled)
-    return _in_order(cancelled.pool.begun(partial(_result_or_error, work), tasks, cancelled, here))
-
-
-def _in_order(results: Generator[tuple[int, Result | Exception]]) -> Iterator[Result]:
+    pool = cancelled.pool if isinstance(cancelled, _CancelWithPool) else None
+    if pool is None or len(tasks) < 2:
+        for task in tasks:
+            yield work(task, cancelled)
+        return
     early: dict[int, Result | Exception] = {}
     wanted = 0
-    with closing(results):
-        for number, result in results:
-            early[number] = result
-            while wanted in early:
-                outcome = early.pop(wanted)
-                if isinstance(outcome, Exception):
-                    raise outcome
-                yield outcome
-                wanted += 1
-
-
-def load_ahead(cancelled: Cancel | None, module: str) -> None:
-    """Have the ``shared_workers`` load a module while they have nothing to do; one that is not there is no
-    error yet."""
-    if isinstance(cancelled, _CancelWithPool):
-        cancelled.pool.load_ahead(module)
+    for number, result in pool.results(partial(_result_or_error, work), tasks, cancelled):
+        early[number] = result
+        while wanted in early:
+            outcome = early.pop(wanted)
+            if isinstance(outcome, Exception):
+                raise outcome
+            yield outcome
+            wanted += 1
 
 
 def _result_or_error(work: Callable[[Task, None], Result], task: Task) -> Result | Exception:
@@ -158,16 +145,6 @@ def _result_or_error(work: Callable[[Task, None], Result], task: Task) -> Result
         return work(task, None)
     except Exception as error:
         return _portable(error)
-
-
-def _result_or_error_here(
-    work: Callable[[Task, Cancel | None], Result], cancelled: Cancel | None, task: Task
-) -> Result | Exception:
-    """The same in this process, which is asked to stop; it has no workers, as they are busy."""
-    try:
-        return work(task, cancelled)
-    except Exception as error:
-        return error
 
 
 _STOP = None
@@ -204,87 +181,48 @@ class _Pool:
     def results(
         self, work: Callable[[Task], Result], tasks: Iterable[Task], cancelled: Cancel | None
     ) -> Iterator[tuple[int, Result]]:
-        """The number and the result of each task, in any order. A task is asked for when a worker is free."""
+        """The number and the result of each task, in any order."""
         answers: SimpleQueue[Any] = SimpleQueue()
         orders = (_Order(work, number, task, answers) for number, task in enumerate(tasks))
         unanswered = 0
         for order in islice(orders, self._workers):
-            self._orders.put(deque([order]))
+            self._orders.put(order)
             unanswered += 1
         while unanswered:
             stop_if(cancelled, self._what)
-            answer = _answered(answers)
-            if answer is None:
+            try:
+                number, result, error = answers.get(timeout=POLL_S)
+            except Empty:
                 continue
+            if error is not None:
+                raise error
             unanswered -= 1
             for order in islice(orders, 1):
-                self._orders.put(deque([order]))
+                self._orders.put(order)
                 unanswered += 1
-            yield answer
-
-    def begun(
-        self,
-        work: Callable[[Task], Result],
-        tasks: Sequence[Task],
-        cancelled: Cancel | None,
-        here: Callable[[Task], Result],
-    ) -> Generator[tuple[int, Result]]:
-        """The same, begun at once; ``here`` is as ``work``, for tasks that this process does."""
-        answers: SimpleQueue[Any] = SimpleQueue()
-        waiting = deque(_Order(work, number, task, answers) for number, task in enumerate(tasks))
-        self._orders.put(waiting)
-        return self._answers(waiting, answers, len(tasks), cancelled, here)
-
-    def _answers(
-        self,
-        waiting: deque[_Order],
-        answers: SimpleQueue[Any],
-        count: int,
-        cancelled: Cancel | None,
-        here: Callable[[Any], Any],
-    ) -> Generator[tuple[int, Any]]:
-        try:
-            while count:
-                stop_if(cancelled, self._what)
-                own = _popped(waiting.pop) if len(waiting) < self._workers else None
-                answer = _answered(answers) if own is None else (own.number, here(own.task))
-                if answer is not None:
-                    count -= 1
-                    yield answer
-        finally:
-            waiting.clear()
-
-    def load_ahead(self, module: str) -> None:
-        for _ in range(self._workers):
-            self._orders.put(deque([_Order(import_module, 0, module, SimpleQueue())]))
+            yield number, result
 
     def _oversee(self) -> None:
         """Hand each order to a worker that is free, or to a new one; at ``_STOP`` end all of them."""
         workers: list[_Worker] = []
         free: list[_Worker] = []
-        waiting: deque[deque[_Order]] = deque()
-        order: _Order | None = None
+        waiting: deque[_Order] = deque()
         try:
-            while (item := self._orders.get()) is not _STOP:
-                if isinstance(item, _Worker):
-                    free.append(item)
+            while (order := self._orders.get()) is not _STOP:
+                if isinstance(order, _Worker):
+                    free.append(order)
                 else:
-                    waiting.append(item)
-                while free or len(workers) < self._workers:
-                    order = _first(waiting)
-                    if order is None:
-                        break
+                    waiting.append(order)
+                while waiting and (free or len(workers) < self._workers):
                     if not free:
                         free.append(_Worker(self._what, self._orders))
                         workers.append(free[-1])
-                    free.pop().orders.put(order)
-                    order = None
+                    free.pop().orders.put(waiting.popleft())
         except BaseException as error:
-            while (order := order or _first(waiting)) is not None:
+            for order in waiting:
                 order.answer(None, error)
-                order = None
-            while (item := self._orders.get()) is not _STOP:
-                while isinstance(item, deque) and (order := _popped(item.popleft)) is not None:
+            while (order := self._orders.get()) is not _STOP:
+                if isinstance(order, _Order):
                     order.answer(None, error)
         finally:
             for worker in workers:
@@ -292,34 +230,6 @@ class _Pool:
             for worker in workers:
                 worker.thread.join()
             self._ended.put(_STOP)
-
-
-def _answered(answers: SimpleQueue[Any]) -> tuple[int, Any] | None:
-    """None while there is no answer yet."""
-    try:
-        number, result, error = answers.get(timeout=POLL_S)
-    except Empty:
-        return None
-    if error is not None:
-        raise error
-    return number, result
-
-
-def _first(waiting: deque[deque[_Order]]) -> _Order | None:
-    """Taken from the first that has any; a caller may take from them meanwhile."""
-    while waiting:
-        order = _popped(waiting[0].popleft)
-        if order is not None:
-            return order
-        waiting.popleft()
-    return None
-
-
-def _popped(pop: Callable[[], _Order]) -> _Order | None:
-    try:
-        return pop()
-    except IndexError:
-        return None
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,12 @@ import sys
 import time
 from itertools import repeat
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from glovecal_models.errors import BadInput, Cancelled, WorkerDied
-from glovecal_models.worker_processes import load_ahead, shared_workers, side_by_side, work_off
+from glovecal_models.worker_processes import work_off
 
-ROUNDED: Any = round
-"""Takes a number, and None."""
 LARGE = bytes(30_000_000)
 """A task that takes much longer to write than a pipe's buffer."""
 STOPPED = """
@@ -179,28 +176,3 @@ def test_what_cannot_be_sent_is_an_error_and_no_hang(work, task) -> None:
 def test_a_worker_has_one_blas_thread() -> None:
     threads = "{pool['num_threads'] for pool in __import__('threadpoolctl').threadpool_info()}"
     assert results(eval, [threads] * 2) == {0: {1}, 1: {1}}
-
-
-@pytest.mark.parametrize("workers", [1, 2, 4])
-def test_results_side_by_side_are_in_order_and_so_are_errors(workers: int) -> None:
-    with shared_workers(workers, "the work", None) as stopped:
-        load_ahead(stopped, "no_such_module")
-        first, second = (side_by_side(ROUNDED, [n + part for n in range(7)], stopped) for part in (0.2, 0.8))
-        assert list(second) == list(range(1, 8))
-        assert list(first) == list(range(7))
-        assert next(side_by_side(ROUNDED, [1.2] * 9, stopped)) == 1  # nobody asks for the others
-        for tasks in (["a", 1.2, "b"], [1.2, 1.2, "c"]):
-            found = side_by_side(ROUNDED, tasks, stopped)
-            with pytest.raises(TypeError, match="str"):
-                list(found)
-
-
-def test_what_is_done_side_by_side_is_cancelled() -> None:
-    asked: list[None] = []
-
-    def is_enough() -> bool:
-        asked.append(None)
-        return len(asked) > 2
-
-    with shared_workers(2, "the work", is_enough) as stopped, pytest.raises(Cancelled, match="the work was"):
-        list(side_by_side(ROUNDED, [1.2] * 1000, stopped))

@@ -16,7 +16,7 @@ from glovecal_models.calibration.added_effect import AddedEffect
 from glovecal_models.calibration.correction_parts import CorrectionParts
 from glovecal_models.calibration.effect_correction import EffectCorrection, usable_correction
 from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for
-from glovecal_models.calibration.motion_smoother import MeasuredAngles, SmoothedMotion, smoothed_takes
+from glovecal_models.calibration.motion_smoother import SmoothedMotion, smoothed
 from glovecal_models.calibration.offline import (
     LEAD,
     UNLED,
@@ -75,15 +75,15 @@ def _motions(
         OwnSignal.of(takes, correspondence_for(takes, name, settings), fit.regressor(name)) for name in names
     ]
     effects, led = EffectCorrection(fit.effects, names, takes.scale), parts_led(fit.effects, leads, names)
-    angles = []
+    motions = []
     for number, take in enumerate(takes.takes):
         base = np.column_stack([signal.takes[number] for signal in own])
         parts = CorrectionParts(*base.shape)
         readings = takes.readings[number]
         added = effects.of_take(take.time_s, base, readings, take.context, take.wearing, parts).degrees
         late = late_angles(base + np.where(usable_correction(added), added, 0.0), added, parts.found, led)
-        angles.append(MeasuredAngles(take.time_s, late.degrees, late.known))
-    return smoothed_takes(angles)
+        motions.append(smoothed(take.time_s, late.degrees, late.known))
+    return motions
 
 
 def _learned(motions: Sequence[SmoothedMotion], row: int, takes: PreparedTakes, rotation: str) -> Lead | None:

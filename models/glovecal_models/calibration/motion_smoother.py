@@ -11,7 +11,6 @@ Association 84(408) 1085).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,8 +26,6 @@ PIECE_FRAMES = 4096
 """Smoothed at once, with a smoothness of their own; bounds the memory."""
 MARGIN_S = 8.0
 """Before and after each piece: a frame further away says nothing, with the longest of the times."""
-MOST_VALUES = 100_000
-"""Angles of several takes side by side: bounds the memory, too."""
 SHORTEST_RUN = 8
 """Frames; fewer stay as they are."""
 UNKNOWN = 1e6
@@ -60,48 +57,21 @@ class SmoothedMotion:
         return np.maximum(np.einsum("nlij,li,lj->nl", self.covariance, weights, weights), 0.0)
 
 
-class MeasuredAngles(NamedTuple):
-    """N frames of L joints, without a gap where they are to be smoothed."""
-
-    time_s: np.ndarray
-    """(N,) rising."""
-    degrees: np.ndarray
-    """(N, L)."""
-    known: np.ndarray
-    """(N, L); elsewhere they do not count."""
-
-    def at(self, rows: slice) -> MeasuredAngles:
-        return MeasuredAngles(*(each[rows] for each in self))
-
-
 def smoothed(time_s: np.ndarray, angles: np.ndarray, known: np.ndarray | None = None) -> SmoothedMotion:
     """Of ``angles`` (N, L), degrees, at rising ``time_s`` (N,); where not ``known`` (N, L) they do not count.
 
     Nothing is averaged over gaps in which the state of effects is forgotten, too.
     """
     known = np.ones(angles.shape, bool) if known is None else known
-    return smoothed_takes([MeasuredAngles(time_s, angles, known)])[0]
-
-
-def smoothed_takes(takes: Sequence[MeasuredAngles]) -> list[SmoothedMotion]:
-    """The same of each of several takes of the same joints: their frames are gone through side by side."""
-    motions = [unsmoothed(take.degrees) for take in takes]
-    waiting = [
-        (motion, kept, around, take)
-        for motion, take in zip(motions, takes, strict=True)
-        for run in unbroken(take.time_s)
-        for kept, around in _pieces(take.time_s, run)
-        if around.stop - around.start >= SHORTEST_RUN
-    ]
-    waiting.sort(key=lambda item: item[2].start - item[2].stop)
-    while waiting:
-        frames = waiting[0][2].stop - waiting[0][2].start
-        together = max(MOST_VALUES // max(frames * takes[0].degrees.shape[1], 1), 1)
-        some, waiting = waiting[:together], waiting[together:]
-        parts = _smoothed([take.at(around) for _, _, around, take in some])
-        for (motion, kept, around, _), part in zip(some, parts, strict=True):
-            motion.put(kept, part, slice(kept.start - around.start, kept.stop - around.start))
-    return motions
+    motion = unsmoothed(angles)
+    for run in unbroken(time_s):
+        for kept, around in _pieces(time_s, run):
+            if around.stop - around.start < SHORTEST_RUN:
+                continue
+            part = _smoothed(time_s[around], angles[around], known[around])
+            inner = slice(kept.start - around.start, kept.stop - around.start)
+            motion.put(kept, part, inner)
+    return motion
 
 
 def unsmoothed(angles: np.ndarray) -> SmoothedMotion:
@@ -126,35 +96,14 @@ def _pieces(time_s: np.ndarray, run: slice) -> list[tuple[slice, slice]]:
     return pieces
 
 
-def _smoothed(pieces: Sequence[MeasuredAngles]) -> list[SmoothedMotion]:
-    """Of each, the longest first. Behind its end a piece is filled up: no time passes, nothing is known."""
-    frames, joints = pieces[0].degrees.shape
-    lengths = np.array([len(piece.time_s) for piece in pieces])
-    elapsed = np.zeros((frames, len(pieces)))
-    angles, known = np.zeros((frames, len(pieces), joints)), np.zeros((frames, len(pieces), joints), bool)
-    for number, (piece, length) in enumerate(zip(pieces, lengths.tolist(), strict=True)):
-        elapsed[:length, number] = np.diff(piece.time_s, prepend=piece.time_s[:1])
-        angles[:length, number] = _filled(piece.degrees, piece.known)
-        known[:length, number] = piece.known
-    every_s = np.array(
-        [
-            max(float(np.median(elapsed[1:length, number])), 1e-6)
-            for number, length in enumerate(lengths.tolist())
-        ]
-    )
-    tau, noise = _most_likely(angles, every_s, lengths)
-    state, covariance = _both_ways(
-        np.repeat(elapsed, joints, axis=1), np.repeat(every_s, joints), angles.reshape(frames, -1),
-        known.reshape(frames, -1), tau.ravel(),
-    )  # fmt: skip
-    motions = []
-    for number, length in enumerate(lengths.tolist()):
-        lanes = slice(number * joints, (number + 1) * joints)
-        is_measured = np.logical_or.accumulate(known[:length, number][::-1])[::-1]
-        of_frames = np.broadcast_to(noise[number], (length, joints))
-        mine = state[:length, lanes], covariance[:length, lanes]
-        motions.append(in_degrees(*mine, tau[number], of_frames, is_measured))
-    return motions
+def _smoothed(time_s: np.ndarray, angles: np.ndarray, known: np.ndarray) -> SmoothedMotion:
+    elapsed = np.diff(time_s, prepend=time_s[:1])
+    every_s = max(float(np.median(elapsed[1:])), 1e-6)
+    filled = _filled(angles, known)
+    tau, noise = _most_likely(filled, every_s)
+    state, covariance = _both_ways(elapsed, every_s, filled, known, tau)
+    is_measured = np.logical_or.accumulate(known[::-1])[::-1]
+    return in_degrees(state, covariance, tau, np.broadcast_to(noise, angles.shape), is_measured)
 
 
 def in_degrees(
@@ -195,42 +144,32 @@ def disturbance(h: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _most_likely(
-    angles: np.ndarray, every_s: np.ndarray, lengths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(T, L) times, seconds, and variances of a frame's noise, degrees squared, by the likelihood of frames
-    taken as evenly spaced, ``every_s`` (T,): then all joints of a take share the gains of each time.
-
-    ``angles`` (N, T, L) of takes with so many frames, ``lengths`` (T,), the longest first.
-    """
-    h = every_s[:, None] / TIMES_S
-    forward, added = transition(h), disturbance(h) * h[..., None, None]
-    covariance = UNKNOWN * np.tile(np.eye(STATES), (*h.shape, 1, 1))
-    _, takes, joints = angles.shape
-    state = np.zeros((*h.shape, joints, STATES))
-    state[..., 0] = angles[0][:, None]
-    square, log_spread = np.zeros((*h.shape, joints)), np.zeros(h.shape)
+def _most_likely(angles: np.ndarray, every_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """(L,) times, seconds, and variances of a frame's noise, degrees squared, by the likelihood of frames
+    taken as evenly spaced: then all joints share the gains of each time."""
+    h = every_s / TIMES_S
+    forward, added = transition(h), disturbance(h) * h[:, None, None]
+    covariance = UNKNOWN * np.tile(np.eye(STATES), (len(h), 1, 1))
+    joints = angles.shape[1]
+    state = np.zeros((len(h), joints, STATES))
+    state[:, :, 0] = angles[0]
+    square, log_spread, counted = np.zeros((len(h), joints)), np.zeros(len(h)), 0
     for number, angle in enumerate(angles):
-        going = int(np.count_nonzero(lengths > number))
-        if going < takes:
-            takes = going
-            state, covariance, forward, added = (each[:going] for each in (state, covariance, forward, added))
         if number:
-            back = forward.swapaxes(-1, -2)
-            state = state @ back
-            covariance = forward @ covariance @ back + added
-        spread = covariance[..., 0, 0] + 1.0
-        gain = covariance[..., 0] / spread[..., None]
-        error = angle[:going, None] - state[..., 0]
-        state = state + error[..., None] * gain[..., None, :]
-        covariance = covariance - gain[..., None] * covariance[..., None, 0, :]
+            state = state @ forward.transpose(0, 2, 1)
+            covariance = forward @ covariance @ forward.transpose(0, 2, 1) + added
+        spread = covariance[:, 0, 0] + 1.0
+        gain = covariance[:, :, 0] / spread[:, None]
+        error = angle - state[:, :, 0]
+        state = state + error[:, :, None] * gain[:, None, :]
+        covariance = covariance - gain[:, :, None] * covariance[:, None, 0, :]
         if number >= STATES:
-            square[:going] += error * error / spread[..., None]
-            log_spread[:going] += np.log(spread)
-    counted = (lengths - STATES)[:, None, None]
+            square += error * error / spread[:, None]
+            log_spread += np.log(spread)
+            counted += 1
     noise = np.maximum(square / counted, LEAST_NOISE_DEG2)
-    best = np.argmin(counted * np.log(noise) + log_spread[..., None], axis=1)
-    return TIMES_S[best], np.take_along_axis(noise, best[:, None], axis=1)[:, 0]
+    best = np.argmin(counted * np.log(noise) + log_spread[:, None], axis=0)
+    return TIMES_S[best], noise[best, np.arange(joints)]
 
 
 class Forward(NamedTuple):
@@ -272,14 +211,11 @@ class MotionFilter:
 
 
 def _both_ways(
-    elapsed: np.ndarray, every_s: np.ndarray, angles: np.ndarray, known: np.ndarray, tau: np.ndarray
+    elapsed: np.ndarray, every_s: float, angles: np.ndarray, known: np.ndarray, tau: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States (N, L, 3) and their covariances (N, L, 3, 3) in units of ``tau`` (L,) and of the noise.
-
-    ``elapsed`` (N, L) since the frame before; ``every_s`` (L,).
-    """
+    """States (N, L, 3) and their covariances (N, L, 3, 3) in units of ``tau`` (L,) and of the noise."""
     frames, joints = angles.shape
-    h = elapsed / tau
+    h = elapsed[:, None] / tau
     forward, added = transition(h), disturbance(h) * (every_s / tau)[:, None, None]
     states, covariances = np.empty((frames, joints, STATES)), np.empty((frames, joints, STATES, STATES))
     gains, errors = np.empty((frames, joints, STATES)), np.empty((frames, joints))

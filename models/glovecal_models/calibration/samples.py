@@ -29,6 +29,8 @@ KEY_POSES = ("flat", "spread", "fist", "overbend")
 LEAST_SHARE_OF_RANGE = 0.25
 """Key poses must span this share of a rotation's recorded range to carry its line."""
 DEFAULT_SAMPLES = 2000
+MOST_COUNTED = 2**22
+"""Cells of a grid up to which the occupied ones are counted in a table, without sorting."""
 INNER_SHARE = 0.25
 """Slopes are taken between this share of a sensor's trained range from below and from above."""
 RANGE_IN_SD = 4.0
@@ -143,31 +145,35 @@ def representative_index(samples: Samples, count: int = DEFAULT_SAMPLES, *, seed
 
 def _cells(samples: Samples, count: int) -> np.ndarray:
     """A cell number for each sample, with the finest grid that has at most ``count`` occupied cells."""
-    space = np.vstack([samples.inputs.T, samples.target])
-    low, high = space.min(axis=1, keepdims=True), space.max(axis=1, keepdims=True)
+    space = np.column_stack([samples.inputs, samples.target])
+    low, high = space.min(axis=0), space.max(axis=0)
     unit = (space - low) / np.where(high > low, high - low, 1.0)
-    finest, takes = None, int(samples.take.max()) + 1
+    cells, takes = samples.take, int(samples.take.max()) + 1
     each = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128)
     # Of grids with no more cells than that, the finest comes next in any case.
-    coarse = sum(takes * divisions ** len(space) <= count for divisions in each)
+    coarse = sum(takes * divisions ** space.shape[1] <= count for divisions in each)
     for divisions in each[max(coarse - 1, 0) :]:
-        key = _key(samples.take, (unit * divisions * (1 - 1e-12)).astype(np.int64), divisions)
-        ordered = np.sort(key)
-        occupied = ordered[np.r_[True, ordered[1:] != ordered[:-1]]]
-        if len(occupied) > count:
+        finer = _numbered(samples.take, np.floor(unit * divisions * (1 - 1e-12)), divisions)
+        if finer.max() >= count:
             break
-        finest = occupied, key
-    return samples.take if finest is None else np.searchsorted(*finest)
+        cells = finer
+    return cells
 
 
-def _key(take: np.ndarray, grid: np.ndarray, divisions: int) -> np.ndarray:
-    """One integer for each column of (take, grid), in their order."""
-    if (int(take.max()) + 1) * float(divisions) ** len(grid) > 2**62:
-        return np.unique(np.vstack([take, grid]), axis=1, return_inverse=True)[1].ravel()
+def _numbered(take: np.ndarray, grid: np.ndarray, divisions: int) -> np.ndarray:
+    """A number for each row of (take, grid), in their order; by one integer key where it has room."""
+    columns = grid.astype(np.int64)
+    if (int(take.max()) + 1) * float(divisions) ** columns.shape[1] > 2**62:
+        return np.unique(np.column_stack([take, columns]), axis=0, return_inverse=True)[1].ravel()
     key = take.astype(np.int64)
-    for row in grid:
-        key = key * divisions + row
-    return key
+    for column in columns.T:
+        key = key * divisions + column
+    span = int(key.max()) + 1
+    if span > MOST_COUNTED:
+        return np.unique(key, return_inverse=True)[1].ravel()
+    occupied = np.zeros(span, dtype=np.int32)
+    occupied[key] = 1
+    return (np.cumsum(occupied) - 1)[key]
 
 
 def _short(numbers: np.ndarray) -> np.ndarray:

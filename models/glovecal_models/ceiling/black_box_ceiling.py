@@ -45,8 +45,6 @@ from glovecal_models.progress import Cancel, Report, part, stop_if
 from glovecal_models.takes.take import Take
 from glovecal_models.worker_processes import side_by_side
 
-CONTROLS = ("flexible", "now", "averaged")
-"""Boxes on the columns of other takes; without a history; with one that knows no direction."""
 WORTH_CONTROLS = 0.005
 """Share of the squared error; a box that gains less needs no controls."""
 FOLDS = 4
@@ -118,7 +116,6 @@ def _of_errors(
         of_rotation = next(found)
         if of_rotation is not None:
             boxes[name] = of_rotation
-    boxes |= _controlled({name: box for name, box in boxes.items() if box.rows is not None}, seed, cancelled)
     if not boxes:
         why = f"no rotation was measured in {limits.fewest_takes} takes"
         return _undecided(why, len(prepared.takes), limits)
@@ -150,72 +147,45 @@ def _boxes_of(
 class _Boxes:
     """What is saved of one rotation's squared error, degrees squared."""
 
-    of_takes: np.ndarray
-    """For each take, summed over its rows."""
-    total: int
-    """Rows."""
+    saved: np.ndarray
+    """For each take, scaled so that its mean is what is saved of the mean square."""
     mean_square: float
     groups: dict[str, float]
     """Rise of the mean square when a group is exchanged between takes."""
     by_take_share: float
     """Of the mean square, that changes from take to take."""
-    rows: RotationRows | None
-    """Where so much is saved that it has to be held against controls."""
     offline_square: float = np.nan
     """Mean square of what is left with both directions of time, without a box."""
 
-    @property
-    def saved(self) -> np.ndarray:
-        """For each take, scaled so that its mean is what is saved of the mean square."""
-        return self.of_takes * len(self.of_takes) / self.total
-
 
 def _boxes(rows: RotationRows, seed: int) -> _Boxes:
-    total = len(rows.target)
+    count, total = int(rows.take.max()) + 1, len(rows.target)
+    alone = np.bincount(rows.take, rows.target**2, count)
     places, at = {}, 0
     for name in GROUPS:
         width = rows.groups[name].shape[1]
         places[name] = (slice(at, at + width), rows.others[name])
         at += width
-    _, products = products_of(rows)
+    powers, products = products_of(rows)
     box = left_by_box(joined(rows.groups), rows.target, rows.take, seed, places, products)
-    saved = rows.alone - box.square
-    rise = {name: float((values.sum() - box.square.sum()) / total) for name, values in box.without.items()}
-    share = _by_take(rows) / rows.mean_square
-    is_worth = saved.sum() > WORTH_CONTROLS * rows.mean_square * total
-    return _Boxes(saved, total, rows.mean_square, rise, share, rows if is_worth else None)
-
-
-def _controlled(boxes: Mapping[str, _Boxes], seed: int, cancelled: Cancel | None) -> dict[str, _Boxes]:
-    """With what their controls save taken off."""
-    rows = {name: box.rows for name, box in boxes.items() if box.rows is not None}
-    asked = [(name, control) for name in rows for control in CONTROLS]
-    squares = dict(zip(asked, side_by_side(partial(_square, rows, seed), asked, cancelled), strict=True))
-    controlled = {}
-    for name, box in boxes.items():
-        flexible, now, averaged = (squares[name, control] for control in CONTROLS)
-        saved = box.of_takes
-        for less, more in ((rows[name].alone, flexible), (now, averaged)):
+    saved = alone - box.square
+    if saved.sum() > WORTH_CONTROLS * rows.mean_square * total:
+        without = {name: values for name, values in rows.groups.items() if name != "history"}
+        directionless = joined(rows.groups | {"history": rows.symmetric})
+        flexible, now, averaged = (
+            left_by_box(columns, rows.target, rows.take, seed, products=of).square
+            for columns, of in (
+                (joined(rows.others), products),
+                (joined(without), powers),
+                (directionless, powers),
+            )
+        )
+        for less, more in ((alone, flexible), (now, averaged)):
             if less.sum() > more.sum():
                 saved = saved - (less - more)
-        controlled[name] = replace(box, of_takes=saved)
-    return controlled
-
-
-def _square(
-    rotations: Mapping[str, RotationRows], seed: int, asked: tuple[str, str], cancelled: Cancel | None
-) -> np.ndarray:
-    """What the control of a rotation leaves: for each take its squared error summed over its rows."""
-    stop_if(cancelled, "the ceiling")
-    rows, control = rotations[asked[0]], asked[1]
-    powers, products = products_of(rows)
-    if control == "flexible":
-        columns, powers = rows.others, products
-    elif control == "now":
-        columns = {name: values for name, values in rows.groups.items() if name != "history"}
-    else:
-        columns = rows.groups | {"history": rows.symmetric}
-    return left_by_box(joined(columns), rows.target, rows.take, seed, products=powers).square
+    rise = {name: float((values.sum() - box.square.sum()) / total) for name, values in box.without.items()}
+    share = _by_take(rows) / rows.mean_square
+    return _Boxes(saved * count / total, rows.mean_square, rise, share)
 
 
 def _by_take(rows: RotationRows) -> float:
@@ -309,11 +279,6 @@ class RotationRows:
     mean_square: float
     """Of the error at the frames, not smoothed."""
     own: tuple[int, ...]
-
-    @property
-    def alone(self) -> np.ndarray:
-        """For each take the squared error that there is, summed over its rows."""
-        return np.bincount(self.take, self.target**2)
 
     @classmethod
     def of(

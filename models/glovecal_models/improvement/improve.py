@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from glovecal_models.calibration import leave_out
 from glovecal_models.calibration.effect_fit import optima_of
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors, left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel
@@ -56,7 +55,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.take_check import take_warnings
-from glovecal_models.worker_processes import load_ahead, shared_workers
+from glovecal_models.worker_processes import shared_workers
 
 Stepped = Callable[[Sequence[Step]], None]
 
@@ -92,14 +91,11 @@ def improve(
         take_hashes = fitting(take_hashes, odd)
     takes, usable = fitting(takes, odd), usable_sensors(layout, fitting(takes, odd))
     with shared_workers(workers, "the improvement", cancelled) as stopped:
-        load_ahead(stopped, leave_out.__name__)
         loop = _Loop(
             takes, usable, odd, subject, settings, tuple(holdout), seed, tuple(take_hashes), limits,
             stopped, report, stepped,
         )  # fmt: skip
         loop.start()
-        if ceiling:
-            load_ahead(stopped, "sklearn.ensemble")
         while len(loop.steps) <= max_steps and loop.go_on():
             pass
         return loop.finished(ceiling=ceiling)
