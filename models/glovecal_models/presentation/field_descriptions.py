@@ -53,7 +53,9 @@ def _fields(of: ast.ClassDef) -> dict[str, str]:
     found = {}
     for node, after in pairwise([*of.body, ast.Pass()]):
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            says = after.value if isinstance(after, ast.Expr) else None
-            is_text = isinstance(says, ast.Constant) and isinstance(says.value, str)
-            found[node.target.id] = inspect.cleandoc(says.value) if is_text else ""
+            match after:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    found[node.target.id] = inspect.cleandoc(text)
+                case _:
+                    found[node.target.id] = ""
     return found

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import cast
 
+import zenoh
 from site_support import Heard, Site, eventually, free_port, tokens
 
 from glovecal_client.keys import service_alive_key
@@ -46,7 +48,7 @@ def test_frames_poses_and_owners_pass_between_linked_routers_and_nothing_else_do
                 eventually(through, "frames reach the second service and poses its viewers")
                 assert {content for _, content in poses.samples} == {b"pose"}
                 assert not frames.samples
-            mine = GloveOwners(second.session, "lab", "realtime-2")
+            mine = GloveOwners(cast(zenoh.Session, second.session), "lab", "realtime-2")
             token = first.router.session.liveliness().declare_token(service_alive_key("lab", "realtime-1"))
             gloves = [f"glove{number}" for number in range(32)]
             eventually(lambda: not all(map(mine.may_take, gloves)), "each has its share")
