@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from glovecal_models.diagnosis.model_on_takes import ModelOnTakes
-from glovecal_models.diagnosis.text import diagnosis_sentences
+from glovecal_models.diagnosis.text import diagnosis_sentences, missing_effects
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan
@@ -148,3 +148,16 @@ def test_a_diagnosis_tells_what_readings_show_first_and_reads_the_others() -> No
     assert diagnosis_sentences(found)[0] == sentence
     faulty = {name for name in takes[0].sensors if f" {name} " in sentence}
     assert all(faulty.isdisjoint(item.sensors) for item in layout.read_without(faulty).correspondences)
+
+
+def test_an_effect_that_is_named_is_the_next_step_though_readings_are_cut_off() -> None:
+    plan = SessionPlan(seed=900, wearings=2, takes_per_wearing=3, take_s=30.0)
+    whole = record_session(plan, ()).takes
+    level = float(np.percentile(np.concatenate([take.readings[:, 0] for take in whole]), 70))
+    takes = [replace(take, readings=np.minimum(take.readings, [level, *[np.inf] * 4])) for take in whole]
+    layout = Layout.from_columns("five", plan.sensors, plan.sensors)
+    found = missing_effects(ModelOnTakes(tuple(takes), layout).diagnosed())
+    assert found.sensor_problems
+    assert found.named is not None
+    assert found.next_command.startswith("glovecal add-effect MODEL saturation")
+    assert replace(found, named=None).next_command.startswith("glovecal take check")

@@ -9,7 +9,7 @@ from glovecal_models.limit import limit
 _CHOSEN = "Not tuned; chosen."
 _PLANTED = (
     "Tuned with faults planted into real takes of three people's ankle sleeves and one's gait, of which no"
-    " take may be odd as it came; three other people were kept apart (2026-11-28)."
+    " take may be odd as it came; then asked of three other people, and changed once more (2026-11-28)."
 )
 _ODD = (
     "Tuned on flex gloves of five sensors and simulated sessions with every known cause, of which no take"
@@ -186,7 +186,7 @@ class ComparisonLimits:
         5.0,
         "degrees",
         "A reference that wanders less within a take is not told.",
-        _PLANTED + " One of those kept apart seems to wander by 4 as it came: this was 4 before.",
+        _PLANTED + " One of the three others seems to wander by 4 as it came: this was 4 before.",
     )
     wandering_times: float = limit(1.5, "times the other takes'", "The same.", _PLANTED)
     wandering_share: float = limit(

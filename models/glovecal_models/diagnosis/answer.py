@@ -224,7 +224,7 @@ class MissingEffects(AboutTakes):
         if self.odd_takes:
             without = "".join(f" --leave-out {take.id}" for take in self.odd_takes)
             return self._train(self.method or "lmc_gpr") + without
-        if self.sensor_problems or self.reference_problems:
+        if self.reference_problems or (self.sensor_problems and named is None):
             return f"glovecal take check {self._spoken_of}"
         if named is not None and named.kind == "finding":
             return f"glovecal record GLOVE after-mending --seconds {LONG_ENOUGH_S}"
