@@ -13,7 +13,15 @@ from glovecal_models.ceiling.answer import LeftToGain
 from glovecal_models.comparison.answer import doubted_floors
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.hold_answer import DriftInHolds
-from glovecal_models.diagnosis.residual_answer import FREE_MOTION, NextTake, Remedy, Unexplained
+from glovecal_models.diagnosis.residual_answer import (
+    FREE_MOTION,
+    NextTake,
+    Remedy,
+    TakePlan,
+    Unexplained,
+    to_record,
+    unplanned,
+)
 from glovecal_models.diagnosis.trial.answer import Candidate, tried_parts
 from glovecal_models.effects.base.findings import Stretch
 from glovecal_models.presentation.document import (
@@ -157,6 +165,8 @@ class MissingEffects(AboutTakes):
     sentences: Sequence[str]
     """What to know, the most important first."""
     _: KW_ONLY
+    take_plan: TakePlan | None = None
+    """All takes to record so that more can be judged, that of `next_take` among them."""
     findings: Sequence[FoundInRecording] = ()
     camera_ranges: Sequence[CoveredRange] = ()
     """Of rotations that a camera measured: angles outside of these ranges are not judged."""
@@ -235,7 +245,7 @@ class MissingEffects(AboutTakes):
             where = "".join(f" --rotation {name}" for name in named.where) * (named.kind == "correction")
             return f"glovecal add-effect {model} {named.effect}{where}"
         if self.next_take is not None:
-            return self.next_take.command
+            return (self.take_plan.steps[0] if self.take_plan else self.next_take).command
         if named is not None:
             return f"glovecal add-effect {model} {named.effect}"
         known = next((command for item in self.actions if (command := self.command_of(item))), None)
@@ -274,9 +284,23 @@ class MissingEffects(AboutTakes):
         return next((take.id for take in (*spoken_of, *self.takes)), "TAKE")
 
     @property
+    def unplanned_take(self) -> NextTake | None:
+        """What decides and is not in the plan."""
+        return unplanned(self.next_take, self.take_plan)
+
+    @property
+    def to_record(self) -> TakePlan | None:
+        """The plan, else that of the one take that decides."""
+        return to_record(self.next_take, self.take_plan)
+
+    @property
     def not_shown(self) -> list[str]:
-        """Effects and why these takes cannot show them, those with the same reason together."""
-        return with_same_reason((item.effect, item.why) for item in self.not_identifiable)
+        """Effects that no planned take opens and why these takes cannot show them, those with the same reason
+        together."""
+        opened = () if self.take_plan is None else self.take_plan.opens
+        return with_same_reason(
+            (item.effect, item.why) for item in self.not_identifiable if item.effect not in opened
+        )
 
     @property
     def of_the_recording(self) -> list[Note]:
@@ -292,7 +316,7 @@ class MissingEffects(AboutTakes):
 
     def presentation(self) -> Presentation:
         model = self.title or (f"model {self.model[:SHORT]}" if self.model else self.subject or "the model")
-        following, held = self.next_take, self.hold_drift
+        following, held, plan = self.unplanned_take, self.hold_drift, self.take_plan
         decided = [f"{item.rule}: {item.sentence}" for item in self.decided]
         rows = [("model", self.model), ("takes", first_of([take.name for take in self.takes]) or None)]
         details = Table([Column("detail", ""), Column("value", "")], rows)
@@ -310,6 +334,7 @@ class MissingEffects(AboutTakes):
                 ),
                 Section("Error of each rotation", self._errors()),
                 Section("Effects of the model", self._of_the_model(), is_detail=True),
+                Section("What to record next", [] if plan is None else plan.parts),
                 Section(
                     "Not identifiable from these takes", [Lines(self.not_shown)] if self.not_shown else []
                 ),

@@ -23,7 +23,7 @@ from glovecal_models.calibration.held_out import (
 )
 from glovecal_models.diagnosis.column_forms import smooth_assessment, stepped_assessment
 from glovecal_models.diagnosis.forward_design import ForwardDesign
-from glovecal_models.diagnosis.next_take import NotIdentifiable, undecidable
+from glovecal_models.diagnosis.next_take import NotIdentifiable, undecidable, wanted_takes
 from glovecal_models.diagnosis.permutation_test import session_p_value
 from glovecal_models.effects.base.assessment import (
     Assessment,
@@ -223,7 +223,8 @@ def assessed(
             report(f"trying {effect.name}", number / len(effects))
         why = why_not_shown(effect, design.signals)
         if why is not None:
-            impossible.append(NotIdentifiable(effect.name, _with_advice(effect, why)))
+            wanted = wanted_takes(design.signals, effect, design.limits)
+            impossible.append(NotIdentifiable(effect.name, _with_advice(effect, why), wanted=wanted))
             continue
         item = None if effect.comparison is None else effect.comparison.assess(design)
         if item is None and isinstance(effect, CorrectionEffect):
@@ -261,7 +262,7 @@ def _assessed(
         return found
     few = undecidable(design.signals, effect, design.limits)
     if few is not None:
-        return NotIdentifiable(effect.name, few.why, few.record, found)
+        return NotIdentifiable(effect.name, few.why, few.record, found, (few.wanted,))
     some = any(item.contrast >= design.limits.least_session_share for item in errors)
     return replace(found, p_value=session_p_value(design, effect, generator) if some else 1.0)
 

@@ -20,6 +20,7 @@ from glovecal_models.diagnosis.next_take import (
     ONLY_POSE_NAMES,
     NotIdentifiable,
     hold_next_take,
+    lacking_takes,
     next_take,
     take_to_decide,
 )
@@ -132,6 +133,10 @@ def concluded(state: State) -> Diagnosis:
         signature=state.signature,
         residual=state.residual,
         next_take=None,
+        lacking=lacking_takes(
+            state.design.signals, state.not_identifiable, state.assessments, state.residual.missing_stretches,
+            question.limits, has_moved=not (problem.is_still or problem.is_sparse),
+        ),
         actions=state.actions,
         by_column=state.by_column,
         effects=question.by_name,
@@ -139,9 +144,10 @@ def concluded(state: State) -> Diagnosis:
         limits=question.limits,
         camera=state.camera,
         decided=state.decided,
-    )
+    )  # fmt: skip
     following = _next_take(diagnosis, question.by_name, question.takes)
-    return replace(diagnosis, next_take=following or take_to_decide(state.not_identifiable, state.residual))
+    following = following or take_to_decide(state.not_identifiable, state.residual)
+    return replace(diagnosis, next_take=following)
 
 
 def _apart_by(state: State) -> frozenset[str]:

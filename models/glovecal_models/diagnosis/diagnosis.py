@@ -12,8 +12,8 @@ from glovecal_models.diagnosis.camera_errors import CameraErrors
 from glovecal_models.diagnosis.hold_drift import HoldDrift
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming
-from glovecal_models.diagnosis.next_take import NotIdentifiable
-from glovecal_models.diagnosis.residual_answer import NextTake
+from glovecal_models.diagnosis.next_take import NOTHING_LACKING, LackingTakes, NotIdentifiable
+from glovecal_models.diagnosis.residual_answer import NextTake, TakePlan
 from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import Effect, kind_of
@@ -46,6 +46,8 @@ class Diagnosis:
     """Findings of the effect that is to be named by its signature, before any ranking; mostly none."""
     residual: UnexplainedResidual
     next_take: NextTake | None
+    lacking: LackingTakes = NOTHING_LACKING
+    """What these takes lack to judge more."""
     actions: tuple[Action, ...] = ()
     """What the associations of the residual ask for, what saves most first."""
     by_column: tuple[Action, ...] = ()
@@ -62,6 +64,11 @@ class Diagnosis:
     """What is the reference's own, where it states deviations; None where it states none."""
     decided: tuple[Decision, ...] = ()
     """Which rules changed something, in their order."""
+
+    @property
+    def take_plan(self) -> TakePlan | None:
+        """All that further takes can decide, what ``next_take`` tells apart included."""
+        return self.lacking.plan(self.next_take)
 
     @property
     def sensor_problems(self) -> tuple[str, ...]:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil, factorial, prod
 
 import numpy as np
 
 from glovecal_models.comparison.residuals import partition_of, permuted_sessions
 from glovecal_models.diagnosis.forward_design import ForwardDesign
+from glovecal_models.diagnosis.limits import DiagnosisLimits
 from glovecal_models.effects.base.control import motions_of, with_context
 from glovecal_models.effects.base.dynamics import LONGEST_GAP_S
-from glovecal_models.effects.base.effect import CorrectionEffect
+from glovecal_models.effects.base.effect import CorrectionEffect, Effect
 from glovecal_models.effects.base.signals import Settings, Signals
 
 PERMUTATIONS = 299
@@ -251,3 +253,97 @@ def _projected(design: ForwardDesign, joint: int, rows: Sequence[np.ndarray]) ->
     values = np.concatenate(target)
     left = values - orthogonal @ (orthogonal.T @ values)
     return _Projected(orthogonal, left, np.concatenate(owner), np.concatenate(row))
+
+
+MOST_WEARINGS = 4
+"""That are asked for at once."""
+
+
+@dataclass(frozen=True)
+class Wearings:
+    """Assignments of takes to wearings, which a permutation test of wearings draws from."""
+
+    names: tuple[str, ...]
+    """Of the wearings there are."""
+    ways: int
+    """Different ones, the recorded one included."""
+    needed: int
+    further: int
+    """Wearings that are missing."""
+    take_names: tuple[str, ...]
+    """Of the takes of each."""
+
+
+def wearings_for(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits) -> Wearings:
+    """How many the takes have, and how many an effect needs whose control is permuted wearings."""
+    assert effect.comparison is not None
+    needed = ceil(1 / effect.comparison.certainty.clear)
+    names = [take.wearing for take in takes]
+    largest = max(names, key=names.count)
+    each = max(limits.fewest_takes_of_a_wearing, names.count(largest))
+    repeated = ([take for take in takes if take.wearing == largest] * each)[:each]
+    take_names = tuple(
+        motion.replace(" ", "-") or f"take{number}" for number, motion in enumerate(motions_of(repeated), 1)
+    )
+    ways, further, every = _ways(takes), 0, list(takes)
+    while further < MOST_WEARINGS and (ways if not further else _ways(every)) < needed:
+        further += 1
+        every += [
+            replace(take, wearing=f"further {further}", take=name)
+            for take, name in zip(repeated, take_names, strict=True)
+        ]
+    return Wearings(tuple(dict.fromkeys(names)), ways, needed, further, take_names)
+
+
+def _ways(takes: Sequence[Signals]) -> int:
+    if len({take.wearing for take in takes}) < 2:
+        return 1
+    return 1 + len(wearing_permutations(takes, np.random.default_rng(0)))
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Values of a context column over takes, which a permutation test of that column draws from."""
+
+    column: str
+    takes: int
+    values: int
+    ways: int
+    """Different assignments of values to takes, the recorded one included."""
+    needed: int
+    further: int
+    """Takes at values of their own that are missing."""
+
+
+def levels_for(takes: Sequence[Signals], effect: Effect, limits: DiagnosisLimits) -> Levels | None:
+    """How many the takes have, of the column of an effect that varies most, and how many it needs; None where
+    a column was not recorded."""
+    assert effect.comparison is not None
+    if not all(any(_is_known(take, name) for take in takes) for name in effect.context):
+        return None
+    alike = limits.alike_context_share
+    column = max(effect.context, key=lambda name: _arrangements(_takes_at_levels(takes, name, alike)))
+    levels = _takes_at_levels(takes, column, alike)
+    certainty, count = effect.comparison.certainty, sum(levels)
+    least = min(certainty.clear, certainty.of_few_takes) if count < limits.few_takes else certainty.clear
+    ways, needed, further = _arrangements(levels), ceil(1 / least), 0
+    while _arrangements([*levels, *([1] * further)]) < needed:
+        further += 1
+    return Levels(column, count, len(levels), ways, needed, further)
+
+
+def _takes_at_levels(takes: Sequence[Signals], column: str, equal: float) -> list[int]:
+    """How many takes share a mean of the column, for each value of it; ``equal``: share of its range."""
+    means = [float(np.nanmean(take.context[column])) for take in takes if _is_known(take, column)]
+    every = np.concatenate([take.context[column] for take in takes if _is_known(take, column)])
+    width = max(equal * float(np.nanmax(every) - np.nanmin(every)), 1e-12)
+    steps = np.cumsum(np.append(0, np.diff(np.sort(means)) > width))
+    return np.bincount(steps).tolist()
+
+
+def _is_known(take: Signals, column: str) -> bool:
+    return column in take.context and bool(np.isfinite(take.context[column]).any())
+
+
+def _arrangements(levels: Sequence[int]) -> int:
+    return factorial(sum(levels)) // prod(factorial(count) for count in levels)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from glovecal_models.presentation.document import answer
+from glovecal_models.presentation.document import Lines, Part, answer, counted
 
 MORE_WEARINGS = "more_wearings"
 MORE_TAKES = "more_takes"
 FREE_MOTION = "free-motion"
+CHANCE = "chance"
+RESIDUAL = "unexplained residual"
+"""Stands among the effects that takes open."""
 
 
 @answer
@@ -25,6 +28,8 @@ class NextTake:
     """Effects; "chance" where the takes are too few to tell an effect from it."""
     take_name: str
     """What to call it: a diagnosis tells by the name that no other take shows this motion."""
+    takes: int = 1
+    """Of which its seconds are the sum."""
 
     @property
     def sentence(self) -> str:
@@ -38,11 +43,137 @@ class NextTake:
         return f"The diagnosis cannot tell {rivals} apart with the takes there are; this one would."
 
     @property
+    def is_take(self) -> bool:
+        """Else it is measured without a reference."""
+        return self.motion != "taps"
+
+    @property
     def command(self) -> str:
         """What starts the recording."""
-        if self.motion == "taps":
+        if not self.is_take:
             return "glovecal take latency GLOVE"
         return f"glovecal record GLOVE {self.take_name} --seconds {self.seconds}"
+
+
+@answer
+class PlannedTakes:
+    """Takes of one kind to record, each with a reference."""
+
+    take_names: tuple[str, ...]
+    """What to call each: a diagnosis tells motions by names."""
+    seconds: int
+    """Of each."""
+    motion: str
+    """Its kind, such as ramps; more_takes and more_wearings are free motion."""
+    what: str
+    """The instruction, for the wearer."""
+    is_put_on_anew: bool = False
+    """Whether the glove is taken off and put on before the first of them: they are a wearing of their own."""
+    opens: tuple[str, ...] = ()
+    """Effects that can be judged after them and all takes planned before; "unexplained residual" stands for
+    that."""
+    separates: tuple[str, ...] = ()
+    """Effects that they tell apart."""
+
+    @classmethod
+    def of(cls, asked: NextTake) -> PlannedTakes:
+        names, seconds = (asked.take_name,) * asked.takes, round(asked.seconds / asked.takes)
+        return cls(names, seconds, asked.motion, asked.what, separates=asked.separates)
+
+    @property
+    def takes(self) -> int:
+        return len(self.take_names)
+
+    @property
+    def sentence(self) -> str:
+        """What to do, for how long, and what for."""
+        put_on = "Take the glove off and put it on again, then record" if self.is_put_on_anew else "Record"
+        named = ", ".join(dict.fromkeys(self.take_names))
+        parts = [f"{put_on} {counted(self.takes, 'take')} of {self.seconds} s, named {named}. {self.what}"]
+        if self.separates:
+            parts.append(f"Tells apart: {', '.join(self.separates)}.")
+        if self.opens:
+            parts.append(f"Can be judged then: {', '.join(self.opens)}.")
+        return " ".join(parts)
+
+    @property
+    def command(self) -> str:
+        """What starts the recording of one of them."""
+        return f"glovecal record GLOVE {self.take_names[0]} --seconds {self.seconds}"
+
+
+@dataclass(frozen=True)
+class PlannedTake:
+    """One take of a plan."""
+
+    step: PlannedTakes
+    name: str
+    is_put_on_anew: bool
+    """Whether the glove is taken off and put on before it."""
+
+
+@answer
+class TakePlan:
+    """All takes to record so that everything can be judged that further takes can show."""
+
+    steps: Sequence[PlannedTakes]
+    """In the order in which they are recorded."""
+    columns: tuple[str, ...] = ()
+    """Context columns that have another value in each take than in all before."""
+
+    @property
+    def opens(self) -> tuple[str, ...]:
+        return tuple(name for step in self.steps for name in step.opens)
+
+    @property
+    def each_take(self) -> list[PlannedTake]:
+        """One after the other."""
+        return [
+            PlannedTake(step, name, step.is_put_on_anew and number == 0)
+            for step in self.steps
+            for number, name in enumerate(step.take_names)
+        ]
+
+    def take_at(self, place: int) -> PlannedTake | None:
+        """Counted from 0; None after the last."""
+        return dict(enumerate(self.each_take)).get(place)
+
+    @property
+    def heading(self) -> str:
+        """How much there is to record, before the steps."""
+        seconds = sum(step.takes * step.seconds for step in self.steps)
+        whole, rest = divmod(seconds, 60)
+        length = f"{seconds} s" if seconds < 120 else f"{whole} min{f' {rest} s' if rest else ''}"
+        return f"{counted(len(self.each_take), 'further take')} ({length} in all) would decide more:"
+
+    @property
+    def sentences(self) -> list[str]:
+        """The steps in their order."""
+        numbered = [f"{place}. {step.sentence}" for place, step in enumerate(self.steps, 1)]
+        return [*numbered, self.columns_sentence] if self.columns else numbered
+
+    @property
+    def parts(self) -> list[Part]:
+        """As people read it."""
+        return [self.heading, Lines(self.sentences)]
+
+    @property
+    def columns_sentence(self) -> str:
+        """What differs from take to take; empty where nothing has to."""
+        columns = ", ".join(f"c.{name}" for name in self.columns)
+        return f"In each take let this differ from all before: {columns}." if columns else ""
+
+
+def unplanned(following: NextTake | None, plan: TakePlan | None) -> NextTake | None:
+    """What decides and is not in the plan; None where that has it, or nothing is to be decided."""
+    return following if following is not None and (plan is None or not following.is_take) else None
+
+
+def to_record(following: NextTake | None, plan: TakePlan | None) -> TakePlan | None:
+    """The plan, else that of the one take that decides; None where there is nothing to record."""
+    if plan is not None or following is None or not following.is_take:
+        return plan
+    return TakePlan([PlannedTakes.of(following)])
 
 
 def explained(before_deg: float, after_deg: float, control_deg: float, p_value: float | None = None) -> str:

@@ -25,7 +25,14 @@ from glovecal_models.diagnosis.naming import (
     with_known_saved,
     with_other_share,
 )
-from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable, as_known, too_few
+from glovecal_models.diagnosis.next_take import (
+    SINGLE_POSES,
+    STILL_HAND,
+    NotIdentifiable,
+    as_known,
+    too_few,
+    wanted_movement,
+)
 from glovecal_models.diagnosis.resampled import SMOOTHING
 from glovecal_models.diagnosis.signatures import (
     are_held_levels,
@@ -84,7 +91,10 @@ def compare(state: State) -> State:
     generator = np.random.default_rng(asked.seed)
     found, impossible = assessed(state.screened, asked.compared, generator, state.has, asked.progress)
     why = STILL_HAND if state.problem.is_still else SINGLE_POSES
-    waiting = [NotIdentifiable(item.name, why) for item in asked.waiting]
+    takes, limits = state.design.signals, state.design.limits
+    waiting = [
+        NotIdentifiable(item.name, why, wanted=wanted_movement(takes, item, limits)) for item in asked.waiting
+    ]
     return replace(state, assessments=tuple(found), not_identifiable=(*impossible, *waiting))
 
 

@@ -21,13 +21,14 @@ from glovecal_models.diagnosis.answer import (
 from glovecal_models.diagnosis.camera_errors import CAMERA
 from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.hold_text import drift_in_holds, hold_sentence
-from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND, NotIdentifiable
+from glovecal_models.diagnosis.next_take import SINGLE_POSES, STILL_HAND
 from glovecal_models.diagnosis.residual_answer import (
     AssociatedColumn,
     FloorTimes,
     Remedy,
     Unexplained,
     explained,
+    unplanned,
 )
 from glovecal_models.diagnosis.residual_association import ResidualAssociation
 from glovecal_models.diagnosis.slow_error import FloorRatio
@@ -58,10 +59,11 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences += [within_known_sentence(item) for item in diagnosis.assessments if item.within_known]
     sentences += [part_sentence(item) for item in diagnosis.assessments if item.part_of]
     sentences += [within_slip_sentence(item) for item in diagnosis.assessments if _is_within_slip(item)]
-    if diagnosis.next_take is not None:
-        sentences.append(diagnosis.next_take.sentence)
+    following = unplanned(diagnosis.next_take, diagnosis.take_plan)
+    if following is not None:
+        sentences.append(following.sentence)
     sentences.append(residual_sentence(diagnosis.residual, None, diagnosis.by_column, diagnosis.actions))
-    return sentences + not_identifiable_sentences(diagnosis.not_identifiable)
+    return sentences + undecided_sentences(diagnosis)
 
 
 def camera_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -185,12 +187,18 @@ def _in_steps(item: Assessment) -> str:
     return "" if item.steps is None else f" It acts in equal steps of {item.steps.width:.3g} of its column."
 
 
-def not_identifiable_sentences(items: Sequence[NotIdentifiable]) -> list[str]:
-    """One for each reason."""
+def undecided_sentences(diagnosis: Diagnosis) -> list[str]:
+    """What to record so that more can be judged, then why no take opens the other effects: one for each
+    reason."""
+    plan = diagnosis.take_plan
     reasons: dict[str, list[str]] = {}
-    for item in items:
-        reasons.setdefault(item.why, []).append(item.effect)
-    return [f"Not identifiable: {', '.join(effects)}. Reason: {why}." for why, effects in reasons.items()]
+    for item in diagnosis.not_identifiable:
+        if plan is None or item.effect not in plan.opens:
+            reasons.setdefault(item.why, []).append(item.effect)
+    planned = [] if plan is None else [plan.heading, *plan.sentences]
+    return planned + [
+        f"Not identifiable: {', '.join(effects)}. Reason: {why}." for why, effects in reasons.items()
+    ]
 
 
 def residual_sentence(
@@ -359,6 +367,7 @@ def missing_effects(diagnosis: Diagnosis) -> MissingEffects:
         not_identifiable=[NotShown(item.effect, item.why) for item in diagnosis.not_identifiable],
         unexplained_residual=unexplained(diagnosis.residual, None, diagnosis.by_column, diagnosis.actions),
         next_take=diagnosis.next_take,
+        take_plan=diagnosis.take_plan,
         sentences=diagnosis_sentences(diagnosis),
         findings=[
             *of_camera,

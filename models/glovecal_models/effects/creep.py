@@ -15,7 +15,7 @@ import numpy as np
 from glovecal_models.effects.base.dynamics import ArrayStateEffect
 from glovecal_models.effects.base.effect import CorrectionEffect, FormSignals, FurtherColumns
 from glovecal_models.effects.base.facts import About, DriftInHolds, Parameter, Shape, Weights
-from glovecal_models.effects.base.relations import RAMPS
+from glovecal_models.effects.base.relations import RAMPS, LackOfMotion
 from glovecal_models.effects.base.relaxation import relax, relax_once
 from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, on_lanes
 
@@ -72,7 +72,8 @@ class Creep(ArrayStateEffect):
 
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         longest = max((float(take.time_s[-1] - take.time_s[0]) for take in takes), default=0.0)
-        return None if longest >= 8.0 else f"the longest take lasts {longest:.0f} s; creep needs 8 s or more"
+        why = f"the longest take lasts {longest:.0f} s; creep needs 8 s or more"
+        return None if longest >= 8.0 else LackOfMotion(why, RAMPS)
 
     def transient_s(self, shape: np.ndarray, settings: Settings) -> float:
         """Of the slowest relaxation, those beside the shape's among them."""

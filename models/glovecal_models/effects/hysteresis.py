@@ -15,7 +15,7 @@ import numpy as np
 from glovecal_models.effects.base.dynamics import ArrayStateEffect, unbroken
 from glovecal_models.effects.base.effect import CorrectionEffect, FormSignals, FurtherColumns
 from glovecal_models.effects.base.facts import About, Parameter, Shape, Weights
-from glovecal_models.effects.base.relations import RAMPS
+from glovecal_models.effects.base.relations import RAMPS, LackOfMotion
 from glovecal_models.effects.base.signals import Settings, Signals, fit_joint_units, in_joint_units
 
 WIDTHS = (0.2, 0.5, 1.0)
@@ -64,7 +64,7 @@ class Hysteresis(ArrayStateEffect):
     def not_applicable_reason(self, takes: Sequence[Signals]) -> str | None:
         if any(_turns(take) >= FEWEST_TURNS for take in takes):
             return None
-        return "no joint goes to and fro in these takes"
+        return LackOfMotion("no joint goes to and fro in these takes", RAMPS)
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         longest_s = max(float(np.ptp(take.time_s)) for take in takes)

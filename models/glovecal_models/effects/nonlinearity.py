@@ -16,7 +16,7 @@ from glovecal_models.effects.base.dynamics import InstantEffect
 from glovecal_models.effects.base.effect import FormSignals
 from glovecal_models.effects.base.facts import BETWEEN_TAKES, About, Weights
 from glovecal_models.effects.base.learned_form import OWN
-from glovecal_models.effects.base.relations import RAMPS
+from glovecal_models.effects.base.relations import RAMPS, LackOfMotion
 from glovecal_models.effects.base.signals import Settings, Signals, on_lanes
 
 DEGREES = (2, 3, 4, 5, 6, 7)
@@ -45,7 +45,8 @@ class Nonlinearity(InstantEffect):
         widest = float(np.max(high - low))
         if widest >= LEAST_RANGE_DEG:
             return None
-        return f"no joint moves more than {widest:.1f} deg; a curve shows from {LEAST_RANGE_DEG:g} deg on"
+        why = f"no joint moves more than {widest:.1f} deg; a curve shows from {LEAST_RANGE_DEG:g} deg on"
+        return LackOfMotion(why, RAMPS)
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         low, high = _range(takes)

@@ -16,7 +16,7 @@ from glovecal_models.effects.base.comparison import EffectComparison
 from glovecal_models.effects.base.dynamics import InstantEffect
 from glovecal_models.effects.base.effect import FormSignals
 from glovecal_models.effects.base.facts import About, Weights
-from glovecal_models.effects.base.relations import CUPPED_PALM
+from glovecal_models.effects.base.relations import CUPPED_PALM, LackOfMotion
 from glovecal_models.effects.base.signals import Settings, Signals
 
 PALM = "PALM_ARCH"
@@ -40,7 +40,7 @@ class PalmArch(InstantEffect):
         if not known:
             return f"no palm arch sensor ({PALM}) is among the other signals"
         if np.ptp(np.concatenate(known)) <= 1e-6:
-            return f"the palm arch sensor ({PALM}) never moves"
+            return LackOfMotion(f"the palm arch sensor ({PALM}) never moves", CUPPED_PALM)
         return None
 
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from glovecal_models.ceiling.answer import LeftToGain
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.diagnosis.hold_answer import DriftInHolds
-from glovecal_models.diagnosis.residual_answer import NextTake, Unexplained
+from glovecal_models.diagnosis.residual_answer import NextTake, TakePlan, Unexplained, to_record, unplanned
 from glovecal_models.effects.base.form_curve import LaneCurves
 from glovecal_models.improvement.fall.answer import FallStep, FloorBand, fall_chart
 from glovecal_models.presentation.document import (
@@ -271,6 +271,8 @@ class Improved(Answer):
     undone: Sequence[EffectTried]
     next_take: NextTake | None
     sentences: Sequence[str]
+    take_plan: TakePlan | None = None
+    """Of the last diagnosis: all takes to record so that more can be judged."""
     baselines: Mapping[str, float | None] = field(default_factory=dict)
     """Errors of simpler calibrations, degrees."""
     noise_floor_interval_deg: Mapping[str, Sequence[float | None]] = field(default_factory=dict)
@@ -288,6 +290,11 @@ class Improved(Answer):
     """The last model as people call it."""
     active: bool = False
     """Whether live frames are predicted with the last model."""
+
+    @property
+    def to_record(self) -> TakePlan | None:
+        """The plan, else that of the one take that decides."""
+        return to_record(self.next_take, self.take_plan)
 
     @property
     def last(self) -> ImprovementStep:
@@ -331,7 +338,8 @@ class Improved(Answer):
         doubts = with_same_reason(
             (name, "; ".join(floor.reasons)) for name, floor in self.noise_floors.items() if floor.reasons
         )
-        notes = [Note("", [self.next_take.sentence])] if self.next_take else []
+        following, plan = unplanned(self.next_take, self.take_plan), self.take_plan
+        notes = [Note("", [following.sentence])] if following else []
         return Presentation(
             f"Improvement of {self.title or self.subject}",
             self._summary(),
@@ -347,6 +355,7 @@ class Improved(Answer):
                     is_detail=True,
                 ),
                 Section("Each rotation", [self._rotations()], is_detail=True),
+                Section("What to record next", [] if plan is None else plan.parts),
                 Section(
                     "Readings while a pose is held",
                     [held.sentence, held.presentation().table] if held and held.poses else [],
@@ -388,7 +397,7 @@ class Improved(Answer):
     def _next(self) -> str:
         model = (self.last.model or "MODEL")[:SHORT]
         if self.next_take is not None:
-            return self.next_take.command
+            return (self.take_plan.steps[0] if self.take_plan else self.next_take).command
         if not self.active:
             return f"glovecal model activate {model}"
         return f"glovecal where {model} --report where-{model}.html"

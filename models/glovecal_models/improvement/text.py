@@ -13,10 +13,10 @@ from glovecal_models.diagnosis.diagnosis import Diagnosis
 from glovecal_models.diagnosis.hold_text import drift_in_holds, hold_sentence
 from glovecal_models.diagnosis.text import (
     UNITS,
-    not_identifiable_sentences,
     nothing_named_sentence,
     ranked_sentence,
     residual_sentence,
+    undecided_sentences,
     unexplained,
 )
 from glovecal_models.effects.base.effect import IntervalEffect
@@ -130,7 +130,7 @@ def _closing_sentences(diagnosis: Diagnosis, improvement: Improvement) -> list[s
     sentences += [item.sentence for item in diagnosis.findings]
     if held is None and not diagnosis.findings and not diagnosis.naming.ranked:
         sentences.append(nothing_named_sentence(diagnosis))
-    sentences += not_identifiable_sentences(diagnosis.not_identifiable)
+    sentences += undecided_sentences(diagnosis)
     sentences.append(residual_sentence(diagnosis.residual, is_noise(improvement), actions=diagnosis.actions))
     if diagnosis.residual.is_significant:
         sentences += not_left_to_gain(improvement.ceiling)
@@ -201,6 +201,7 @@ def improved(found: Improvement) -> Improved:
         stopped=found.stopped,
         undone=[EffectTried(**effect_tried(item)) for item in found.undone],
         next_take=found.next_take,
+        take_plan=None if last is None else last.take_plan,
         sentences=improvement_sentences(found),
         baselines=found.baselines,
         noise_floor_interval_deg={name: [floor.low_deg, floor.high_deg] for name, floor in floors.items()},

@@ -77,7 +77,11 @@ def test_what_few_takes_show_faintly_asks_for_more_takes():
     found = diagnose(takes, LAYOUT)
     assert found.named is None
     reason = "6 takes are too few to tell what may be saved from chance: record 6 more takes"
-    assert f"Not identifiable: hysteresis, lag. Reason: {reason}." in diagnosis_sentences(found)
+    assert {item.effect for item in found.not_identifiable if item.why == reason} == {"hysteresis", "lag"}
+    assert found.take_plan is not None
+    assert {"hysteresis", "lag"} <= set(found.take_plan.opens)
+    assert sum(step.takes for step in found.take_plan.steps) == 6
+    assert found.take_plan.heading in diagnosis_sentences(found)
     assert found.next_take is not None
     assert found.next_take.separates == ("hysteresis", "lag", "chance")
 

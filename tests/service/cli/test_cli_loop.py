@@ -66,7 +66,14 @@ def test_diagnose_names_shows_evidence_and_says_what_to_run(loop: tuple[Run, str
     assert "Rules that decided" not in run("diagnose", model).out
     lonely = run("diagnose", model, "--take", "w1-t1")
     assert lonely.code == 0, lonely.err
-    assert "donning_shift: all takes are of one wearing" in lonely.out
+    assert "Take the glove off and put it on again, then record" in lonely.out
+    assert "further takes (" in lonely.out.partition("What to record next:\n")[2].partition("\n")[0]
+    assert "permutations" not in lonely.out
+    why = {
+        item["effect"]: item["why"]
+        for item in run("diagnose", model, "--take", "w1-t1", "--json").json["not_identifiable"]
+    }
+    assert why["donning_shift"] == "all takes are of one wearing"
 
 
 SHORT_WALK = ("add-effect", "diagnose")

@@ -100,6 +100,15 @@ def test_the_same_question_again_is_answered_at_once(walk: Walk) -> None:
     assert len(first["takes"]) == 7
 
 
+def test_what_few_takes_cannot_decide_is_one_plan(walk: Walk) -> None:
+    body = {"takes": [take["name"] for take in walk.takes[:2]]}
+    plan = walk.result(walk.client.post(f"/models/{walk.model}/diagnose", body))["take_plan"]
+    anew = [step for step in plan["steps"] if step["is_put_on_anew"]]
+    assert all("donning_shift" not in step["opens"] for step in plan["steps"] if step not in anew)
+    assert "donning_shift" in anew[-1]["opens"]
+    assert all(len(step["take_names"]) >= 1 and step["seconds"] >= 20 for step in plan["steps"])
+
+
 def test_an_added_effect_is_a_child_and_comes_out_again(walk: Walk) -> None:
     before = walk.models()
     job = walk.client.post(f"/models/{walk.model}/effects", {"effect": CAUSE, "rotations": ["M_PIP"]})

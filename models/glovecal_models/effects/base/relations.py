@@ -16,6 +16,19 @@ class Motion:
     what: str
     """The instruction, in the words that the wearer reads."""
     seconds: int
+    """Of all its takes."""
+    takes: int = 1
+
+
+class LackOfMotion(str):
+    """Why takes cannot show an effect, where a take of ``motion`` could."""
+
+    __slots__ = ("motion",)
+
+    def __new__(cls, why: str, motion: Motion) -> LackOfMotion:
+        lacks = super().__new__(cls, why)
+        lacks.motion: Motion = motion
+        return lacks
 
 
 @dataclass(frozen=True)
@@ -175,6 +188,7 @@ CROSSED = Motion(
     "Change one thing at a time: put in a fresh battery without switching off, take the glove off and on"
     " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
     120,
+    3,
 )
 TAPS = Motion(
     "taps",

@@ -21,6 +21,7 @@ from glovecal_models.effects.base.assessment import (
     squared_in_blocks,
 )
 from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.base.relations import FAST, LackOfMotion
 from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
 
@@ -84,7 +85,7 @@ class DelayErrors:
 def why_no_delay_shows(takes: Sequence[Signals]) -> str | None:
     """None where some joint moved fast enough."""
     fastest = max((_speed(take) for take in takes), default=0.0)
-    return None if fastest >= FAST_SHARE else "no fast motion was recorded"
+    return None if fastest >= FAST_SHARE else LackOfMotion("no fast motion was recorded", FAST)
 
 
 def _speed(take: Signals) -> float:

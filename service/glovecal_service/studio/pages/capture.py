@@ -34,19 +34,20 @@ PROPOSING: dict[str, type[MissingEffects] | type[Improved]] = {
     "diagnose": MissingEffects,
     "improve": Improved,
 }
-"""Jobs that may want a take."""
+"""Jobs that may want takes."""
 AGAIN_EVERY_S = 2.0
 
 
 def add(studio: Studio) -> None:
-    """``/studio/capture``: ``sampling`` follows that one, ``proposal`` is a diagnosis that wants a take."""
+    """``/studio/capture``: ``sampling`` follows that one, ``proposal`` is a diagnosis that wants takes,
+    ``place`` which of them is next, from 1."""
 
     @page("/capture")
-    async def capture(mode: str = "", sampling: str = "", proposal: str = "") -> None:
+    async def capture(mode: str = "", sampling: str = "", proposal: str = "", place: int = 1) -> None:
         wanted = mode if mode in MODES else "recording" if proposal else "sampling"
         async with shell(studio, "capture", "Capture"):
             add_take_styles()
-            await CapturePage(studio, wanted).build(sampling, proposal)
+            await CapturePage(studio, wanted).build(sampling, proposal, place)
 
 
 class CapturePage:
@@ -56,7 +57,7 @@ class CapturePage:
         self._studio = studio
         self._mode = mode
 
-    async def build(self, sampling: str, proposal: str) -> None:
+    async def build(self, sampling: str, proposal: str, place: int) -> None:
         with ui.element("nav").props('aria-label="Ways to capture"').classes("studio-nav capture-modes"):
             for mode, name in MODES.items():
                 link = ui.link(name, f"/capture?mode={mode}").classes("studio-tab")
@@ -73,7 +74,10 @@ class CapturePage:
             return
         with self._main:
             if self._mode == "recording":
-                await RecordingPage(self._studio, gloves).build(await self._proposed(proposal))
+                proposed = await self._proposed(proposal)
+                plan = None if proposed is None else proposed.to_record
+                subject = None if proposed is None else proposed.subject
+                await RecordingPage(self._studio, gloves).build(proposal, plan, subject, place)
                 return
             if self._mode == "session":
                 await SessionPage(self._studio).build()
@@ -105,7 +109,7 @@ class CapturePage:
         return found[0] if found else None
 
     async def _proposed(self, job: str) -> MissingEffects | Improved | None:
-        """What a diagnosis wants to be recorded next, with its subject."""
+        """A diagnosis, or an improvement's last, with its subject."""
         if not job:
             return None
         try:
@@ -117,7 +121,7 @@ class CapturePage:
             answered = read(PROPOSING[found.kind], found.result)
         except (KeyError, ValidationError):  # another kind's, or of another version
             return None
-        return None if answered.next_take is None else replace(answered, subject=found.subject)
+        return replace(answered, subject=found.subject)
 
     async def _again(self) -> None:
         if (await self._studio.service.read(Gloves, "/gloves")).seen:

@@ -9,8 +9,7 @@ from typing import Any
 
 from nicegui import ui
 
-from glovecal_models.diagnosis.answer import MissingEffects
-from glovecal_models.improvement.answer import Improved
+from glovecal_models.diagnosis.answer import TakePlan
 from glovecal_service.rest.glove.answer import Film, GloveView, Recording
 from glovecal_service.rest.take.answer import Take
 from glovecal_service.studio.guide.board import MAIN_KEYS, Board, Shown, Tone
@@ -47,41 +46,36 @@ class RecordingPage:
         self._studio = studio
         self._worn = GloveAndWearer(studio, gloves)
         self._recording: Recording | None = None
-        self._ask = ""
-        """What a diagnosis asks the wearer to do."""
+        self._proposal, self._next = "", 0
+        """The job of a diagnosis that wants takes, and the place of the next of them."""
+        self._plan: TakePlan | None = None
+        self._counted = ""
+        """The recording that was counted last as one of them."""
         self._films = False
         """A video goes on that was begun here."""
         self._filmed = ""
         self._looked_at: tuple[str, ui.element | None] = "", None
 
-    async def build(self, proposing: MissingEffects | Improved | None) -> None:
-        """``proposing``: a diagnosis, or an improvement's last, that wants something to be recorded."""
-        wanted = None if proposing is None else proposing.next_take
-        self._ask = "" if wanted is None else wanted.what
+    async def build(self, proposal: str, plan: TakePlan | None, subject: str | None, place: int) -> None:
+        """``plan``: of the job ``proposal``, about ``subject``; its takes from ``place`` on, which counts
+        from 1, are still to be recorded."""
+        self._proposal, self._plan = proposal, plan
+        self._next = max(place - 1, 0)
         with ui.element("section").classes("card capture-form").props('aria-label="Recording"'):
-            if wanted is not None:
-                with ui.element("div").classes("capture-proposal"):
-                    heading(2, f"What the diagnosis wants to be recorded: {wanted.seconds} s")
-                    ui.label(wanted.what)
-                    if wanted.separates:
-                        ui.label(f"It decides between {', '.join(wanted.separates)}.")
-            else:
-                heading(2, "Record a take")
-            await self._worn.build(None if proposing is None else proposing.subject)
+            self._proposed = ui.element("div").classes("capture-proposal")
+            await self._worn.build(subject)
             with ui.element("div").classes("capture-fields"):
-                name = _free_name() if wanted is None else wanted.take_name
-                self._name = ui.input("Name of the take", value=name).classes("choice")
+                self._wearing = ui.input("Name of the new wearing").classes("choice")
+                self._name = ui.input("Name of the take").classes("choice")
                 self._seconds = ui.number(
-                    "Stop after, s (empty: by key)",
-                    value=None if wanted is None else wanted.seconds,
-                    min=1,
-                    max=LONGEST_S,
+                    "Stop after, s (empty: by key)", value=None, min=1, max=LONGEST_S
                 ).classes("capture-number")
                 self._pre_roll = ui.number(
                     "Pre-roll, s", value=PRE_ROLL_S, min=0, max=LONGEST_PRE_ROLL_S
                 ).classes("capture-number")
             self._film = ui.select(FILMED, value="", label="Film it, with a camera of the service's computer")
             self._film.classes("choice")
+        self._fill_in()
         self._board = Board(WAITING, keys={"main": MAIN_KEYS}, label="What happens now")
         self._board.on_act(self._act)
         with ui.element("div").classes("capture-acts"):
@@ -92,6 +86,48 @@ class RecordingPage:
         self._recording = await self._going_on()
         self._timer = again(EVERY_S, self._look)
         self._show()
+
+    @property
+    def _planned(self):
+        """The next take of the plan; None where there is none, or all were recorded."""
+        return None if self._plan is None else self._plan.take_at(self._next)
+
+    @property
+    def _ask(self) -> str:
+        """What the wearer is to do; empty: nothing in particular."""
+        planned = self._planned
+        return "" if planned is None else planned.step.what
+
+    def _fill_in(self) -> None:
+        """The form for the next take of the plan, else for one in free motion."""
+        planned = self._planned
+        self._proposed.clear()
+        with self._proposed:
+            if self._plan is None or planned is None:
+                heading(2, "Record a take" if self._plan is None else "All takes of the plan are recorded")
+                if self._plan is not None:
+                    ui.label("Give them references, train with them, and diagnose again.")
+            else:
+                heading(2, f"Take {self._next + 1} of {len(self._plan.each_take)} that the diagnosis wants")
+                if planned.is_put_on_anew:
+                    ui.label("Take the glove off and put it on again.")
+                ui.label(planned.step.what)
+                ui.label(self._plan.columns_sentence)
+                if planned.step.separates:
+                    ui.label(f"It decides between {', '.join(planned.step.separates)}.")
+        is_anew = planned is not None and planned.is_put_on_anew
+        self._wearing.set_visibility(is_anew)
+        self._wearing.set_value(f"{datetime.now():%Y-%m-%d %H.%M}" if is_anew else "")
+        self._name.set_value(_free_name() if planned is None else planned.name)
+        self._seconds.set_value(None if planned is None else planned.step.seconds)
+
+    def _go_on(self) -> None:
+        """To the next take of the plan, also where the page is loaded again."""
+        if self._planned is not None:
+            self._next += 1
+            ui.navigate.history.replace(f"?proposal={self._proposal}&place={self._next + 1}")
+            self._fill_in()
+            self._show()
 
     async def _going_on(self) -> Recording | None:
         found = await self._studio.service.read(list[Recording], "/recordings", only_open=True)
@@ -107,7 +143,7 @@ class RecordingPage:
         self._show()
 
     async def _start(self) -> None:
-        await self._worn.put_on()
+        await self._worn.put_on(str(self._wearing.value).strip() or None)
         self._account.clear()
         if self._film.value:
             await self._studio.service.post("/films", {"source": self._film.value})
@@ -180,6 +216,9 @@ class RecordingPage:
         self._account.clear()
         if str(self._name.value).startswith(FREE):
             self._name.set_value(_free_name())
+        if account.take and self._counted != recording.id:
+            self._counted = recording.id
+            self._go_on()
         with self._account, ui.element("section").classes("finding"):
             heading(2, f"{recording.name}: {recording.state}")
             if account.recorded is not None:

@@ -141,15 +141,7 @@ class DiagnosePage:
                     ui.label(sentence)
         self._recorded(found)
         self._remains(found)
-        following = found.next_take
-        if following is not None:
-            with ui.element("section").classes("finding"):
-                heading(2, "What to record next")
-                rivals = " and ".join(following.separates)
-                ui.label(following.what)
-                ui.label(f"{following.seconds} s" + (f"; tells {rivals} apart." if rivals else "."))
-                if following.motion != "taps":  # no take: its text names the command
-                    ui.link("Record it", f"/capture?proposal={job}").classes("studio-link")
+        _to_record(job, found)
         if found.not_shown:
             with ui.element("section").classes("finding"):
                 heading(2, "Not judged: what these takes could not show")
@@ -224,6 +216,25 @@ class DiagnosePage:
                             f"Add {action.effect}",
                             on_click=partial(self._add, action.effect, [action.rotation]),
                         ).props("outline no-caps").classes("studio-target")
+
+
+def _to_record(job: str, found: MissingEffects) -> None:
+    """What would decide more, and the start of its recording; taps are no take, their text names the
+    command."""
+    following, plan = found.unplanned_take, found.to_record
+    if following is None and plan is None:
+        return
+    with ui.element("section").classes("finding"):
+        heading(2, "What to record next")
+        if plan is not None:
+            ui.label(plan.heading)
+            _listed(plan.sentences)
+            ui.button(
+                "Record it" if len(plan.each_take) == 1 else "Record them",
+                on_click=lambda: ui.navigate.to(f"/capture?proposal={job}"),
+            ).props("unelevated no-caps color=indigo-8").classes("studio-main-act")
+        elif following is not None:
+            ui.label(following.sentence)
 
 
 def _has_gained(model: Model, found: MissingEffects, named: NamedEffect) -> bool:
