@@ -24,6 +24,8 @@
                             (half an hour);
                             study planted: faults planted into 20 s of real readings, and what is told of them
                             (needs the shared recordings; ten minutes; --healthy N: simulated gloves);
+                            study told: what doctor, live watch, training and pages tell of healthy gloves
+                            (ten minutes; --gloves N, --method lmc_gpr);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles (half an hour);
                             study camera-errors: what the colour glove's tracker errs by (an hour);
@@ -263,6 +265,8 @@ def study(arguments: list[str]) -> int:
         return run("python", "tests/study/offline_study.py", *arguments[1:])
     if arguments[:1] == ["planted"]:
         return run("python", "tests/study/planted_study.py", *arguments[1:])
+    if arguments[:1] == ["told"]:
+        return run("python", "tests/study/told_study.py", *arguments[1:])
     if arguments[:1] == ["ablation"]:
         return run("python", "tests/study/ablation.py", *arguments[1:])
     if arguments[:1] == ["demos"]:

@@ -44,6 +44,8 @@ FEWEST_TOGETHER = 3
 """Sensors; fewer have nothing in common."""
 MOSTLY = 0.8
 """Share of the frames at one value, from which on a sensor is looked at more closely."""
+RESTING_VALUES = 2
+"""Between so many a joint at rest trembles too: in some seconds they do not tell a sensor from its joint."""
 MOST_NAMED = 4
 
 
@@ -61,6 +63,7 @@ def worn_glove_findings(
 ) -> tuple[GloveFinding, ...]:
     """Of some seconds of frames, the hand in motion; ``model``: the one that is served, None without any."""
     low, high = _ranges(take, model)
+    fit = _fit(take, model)
     moved = np.ptp(take.readings, axis=0) >= np.fmax(MOVED_COUNTS, MOVED_SHARE * np.nan_to_num(high - low))
     jumps = _jumps(take, low, high)
     return (
@@ -68,7 +71,7 @@ def worn_glove_findings(
         *_sensors(take, moved),
         *(GloveFinding("sensor", f"{each}.", each.remedy) for each in channel_faults(take)),
         *jumps,
-        *((not jumps and _wearer(take, model)) or _place(take, low, high)),
+        *((not jumps and _wearer(take, fit)) or _place(take, fit)),
     )
 
 
@@ -97,19 +100,29 @@ def live_findings(
     return tuple(found)
 
 
-def _wearer(take: Take, model: CalibrationModel | None) -> Sequence[GloveFinding]:
-    """Whether the model is that of somebody else; nothing where the supply explains the readings."""
-    if model is None:
-        return ()
-    low, high = _ranges(take, model)
-    if any(finding.part == "supply" for finding in _place(take, low, high)):
-        return ()
-    names = model.layout.sensors
-    if not set(names) <= set(take.sensors):
-        return ()
-    readings = take.readings[:, [take.sensors.index(name) for name in names]]
+@dataclass(frozen=True)
+class _Fit:
+    """What a model learned, and how its sensors stand in a take."""
+
+    wearer: WearerFit
+    predictor: GlovePredictor
+    columns: Sequence[int]
+
+
+def _fit(take: Take, model: CalibrationModel | None) -> _Fit | None:
+    if model is None or not set(model.layout.sensors) <= set(take.sensors):
+        return None
     predictor = GlovePredictor(model)
-    return _misfit(WearerFit(model, predictor).misfit(readings, predictor.predict(readings).mean))
+    columns = [take.sensors.index(name) for name in model.layout.sensors]
+    return _Fit(WearerFit(model, predictor), predictor, columns)
+
+
+def _wearer(take: Take, fit: _Fit | None) -> Sequence[GloveFinding]:
+    """Whether the model is that of somebody else; nothing where the supply explains the readings."""
+    if fit is None or any(finding.part == "supply" for finding in _place(take, fit)):
+        return ()
+    readings = take.readings[:, fit.columns]
+    return _misfit(fit.wearer.misfit(readings, fit.predictor.predict(readings).mean))
 
 
 def _misfit(found: Misfit) -> Sequence[GloveFinding]:
@@ -170,6 +183,7 @@ def _sensors(take: Take, moved: np.ndarray) -> Sequence[GloveFinding]:
             "Look at its strip and its connector; until it is repaired, train without it (it is left out).",
         )
         for dead in dead_sensors([take], take.sensors)
+        if len(np.unique(take.readings[:, take.sensors.index(dead.sensor)])) != RESTING_VALUES
     ]
 
 
@@ -200,33 +214,35 @@ def _jumps(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFindi
     )  # fmt: skip
 
 
-def _place(take: Take, low: np.ndarray, high: np.ndarray) -> Sequence[GloveFinding]:
-    """Readings beyond what the model has learned: of most sensors on one side, or of a few."""
-    span = high - low
-    known = np.isfinite(span) & (span > 0)
+def _place(take: Take, fit: _Fit | None) -> Sequence[GloveFinding]:
+    """Readings beyond all that the model's hand can do: of most sensors on one side, or of a few."""
+    if fit is None:
+        return ()
+    wearer, readings = fit.wearer, take.readings[:, fit.columns]
+    known = np.isfinite(wearer.least) & np.isfinite(wearer.most)
     if not known.any():
         return ()
-    margin = OUTSIDE_SHARE * np.where(known, span, 1.0)
-    below = known & ((take.readings < low - margin).mean(axis=0) > OUTSIDE_FRAMES)
-    above = known & ((take.readings > high + margin).mean(axis=0) > OUTSIDE_FRAMES)
+    margin = OUTSIDE_SHARE * np.where(known, wearer.high - wearer.low, 1.0)
+    below = known & ((readings < wearer.least - margin).mean(axis=0) > OUTSIDE_FRAMES)
+    above = known & ((readings > wearer.most + margin).mean(axis=0) > OUTSIDE_FRAMES)
     together = max(FEWEST_TOGETHER, ALL_AT_ONCE * known.sum())
     for outside, word in ((below, "below"), (above, "above")):
         if outside.sum() >= together:
             return (
                 GloveFinding(
                     "supply",
-                    f"{int(outside.sum())} of {int(known.sum())} sensors read {word} all that the model "
-                    "learned.",
+                    f"{int(outside.sum())} of {int(known.sum())} sensors read {word} all that this hand can"
+                    " do.",
                     "That is no hand: check battery and supply, and that this is the glove of the model.",
                 ),
             )
-    names = [name for name, is_out in zip(take.sensors, below | above, strict=True) if is_out]
+    names = [name for name, is_out in zip(wearer.sensors, below | above, strict=True) if is_out]
     if not names:
         return ()
     return (
         GloveFinding(
             "wearing",
-            f"{', '.join(names)} read outside what the model learned.",
+            f"{', '.join(names)} read outside what this hand can do.",
             "The glove sits differently: put it on again, or let a quick check learn the difference.",
         ),
     )

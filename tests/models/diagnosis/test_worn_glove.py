@@ -11,7 +11,7 @@ import pytest
 
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import TrainingSettings
+from glovecal_models.calibration.training_settings import Method, TrainingSettings
 from glovecal_models.diagnosis.worn_glove import worn_glove_findings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import segments
@@ -61,6 +61,31 @@ def parts(take: Take, model: CalibrationModel | None, nominal_hz: float = RATE_H
 def test_a_healthy_glove_is_left_alone(model: CalibrationModel) -> None:
     assert parts(seconds(1), model) == []
     assert parts(seconds(1), None) == []
+
+
+@pytest.mark.parametrize("method", ["linear", "lmc_gpr"])
+def test_beyond_a_narrow_training_the_joint_may_have_moved(method: Method) -> None:
+    """A model that learned a third of each joint's range says nothing of the rest."""
+    glove = SimulatedGlove(1, "cyberglove18")
+    every = simulate_take(glove, segments("evaluation", 1), rate_hz=30, name="evaluation").take
+    angles = every.reference_at_frames(every.rotations)
+    middle, third = np.nanmedian(angles, axis=0), np.nanstd(angles, axis=0)
+    near = np.abs(angles - middle).max(axis=1, initial=0.0) < 1.5 * third.max()
+    few = replace(
+        every, time_s=every.time_s[near], readings=every.readings[near], reference=angles[near],
+        reference_time_s=every.time_s[near], poses=None,
+        context={name: values[near] for name, values in every.context.items()},
+    )  # fmt: skip
+    narrow = train([few], LAYOUT, "anna", TrainingSettings(method=method, folds=0, samples=200))
+    assert parts(seconds(1), narrow) == []
+
+
+def rest_wrist(readings: np.ndarray) -> None:
+    readings[:, at("W_FLEX")] = 100 + np.arange(len(readings)) // 7 % 2
+
+
+def test_a_joint_at_rest_trembles_between_two_values(model: CalibrationModel) -> None:
+    assert parts(changed(seconds(1), rest_wrist), model) == []
 
 
 def stick(readings: np.ndarray) -> None:
