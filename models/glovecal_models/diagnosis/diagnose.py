@@ -134,7 +134,7 @@ def concluded(state: State) -> Diagnosis:
         residual=state.residual,
         next_take=None,
         lacking=lacking_takes(
-            state.design.signals, state.not_identifiable, state.assessments, state.residual.missing_stretches,
+            state.design.signals, state.not_identifiable, state.assessments,
             question.limits, has_moved=not (problem.is_still or problem.is_sparse),
         ),
         actions=state.actions,

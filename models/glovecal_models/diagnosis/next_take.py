@@ -23,7 +23,6 @@ from glovecal_models.diagnosis.residual_answer import (
     FREE_MOTION,
     MORE_TAKES,
     MORE_WEARINGS,
-    RESIDUAL,
     NextTake,
     PlannedTakes,
     TakePlan,
@@ -48,7 +47,7 @@ def asked_take(motion: str, what: str, seconds: int, separates: tuple[str, ...],
     return NextTake(motion, what, seconds, separates, name, takes)
 
 
-BLOCK_S, STRETCH_S = 5, 10
+BLOCK_S = 5
 PLANNED_S = (20, 60)
 """Limits of a planned take in free motion, which is as long as those before."""
 IN_FREE_MOTION = "Move all joints freely, as in everyday use."
@@ -331,17 +330,13 @@ def lacking_takes(
     takes: Sequence[Signals],
     impossible: Sequence[NotIdentifiable],
     assessments: Sequence[Assessment],
-    stretches: int,
     limits: DiagnosisLimits,
     *,
     has_moved: bool,
 ) -> LackingTakes:
-    """Of effects that ``takes`` cannot show, of those compared on too little, and of the residual where so
-    many stretches of 10 s are missing."""
+    """Of effects that ``takes`` cannot show, and of those compared on too little."""
     by_effect = {item.effect: item.wanted for item in impossible if item.wanted}
     by_effect |= _wanted_blocks(takes, assessments, limits)
-    if stretches:
-        by_effect[RESIDUAL] = (Wanted(ceil(stretches / (_each_s(takes) // STRETCH_S))),)
     return LackingTakes(by_effect, _each_s(takes), has_moved)
 
 

@@ -11,8 +11,6 @@ MORE_WEARINGS = "more_wearings"
 MORE_TAKES = "more_takes"
 FREE_MOTION = "free-motion"
 CHANCE = "chance"
-RESIDUAL = "unexplained residual"
-"""Stands among the effects that takes open."""
 
 
 @answer
@@ -70,8 +68,7 @@ class PlannedTakes:
     is_put_on_anew: bool = False
     """Whether the glove is taken off and put on before the first of them: they are a wearing of their own."""
     opens: tuple[str, ...] = ()
-    """Effects that can be judged after them and all takes planned before; "unexplained residual" stands for
-    that."""
+    """Effects that can be judged after them and all takes planned before."""
     separates: tuple[str, ...] = ()
     """Effects that they tell apart."""
 

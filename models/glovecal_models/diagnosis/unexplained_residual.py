@@ -105,14 +105,6 @@ class UnexplainedResidual:
         return len(every) == len(self.slow) > 0 and all(item.is_within_floor for item in every)
 
     @property
-    def missing_stretches(self) -> int:
-        """Of 10 s, by which too few were measured to judge it; 0 where that is not the obstacle."""
-        if self.obstacle != "few stretches":
-            return 0
-        most = max((item.stretches for item in self.slow.values()), default=0)
-        return max(self.limits.slow_fewest_stretches - most, 1)
-
-    @property
     def judged(self) -> tuple[SlowError, ...]:
         """Slow errors of the joints that were measured for long enough."""
         return tuple(item for item in self.slow.values() if _is_judgeable(item, self.limits))
