@@ -62,17 +62,11 @@ export default {
       if (name === "mute") this.mute();
       else this.$emit("act", name);
     });
-    const frame = () => {
-      if (this.gone) return;
-      this.draw();
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
     this.$refs.board.focus({ preventScroll: true });
     if (matchMedia("(max-width: 860px)").matches && this.state.number) this.$refs.board.scrollIntoView();
   },
   beforeUnmount() {
-    this.gone = true;
+    cancelAnimationFrame(this.next);
     this.deaf();
     this.tones.close();
   },
@@ -86,18 +80,27 @@ export default {
     },
   },
   methods: {
-    time() { this.endsAt = performance.now() + 1000 * (this.state.left_s ?? 0); },
+    time() {
+      this.endsAt = performance.now() + 1000 * (this.state.left_s ?? 0);
+      this.run();
+    },
+    /** Frames of the browser are asked for only as long as time is counted down. */
+    run() {
+      cancelAnimationFrame(this.next);
+      if (this.state.of_s) this.next = requestAnimationFrame(() => { if (this.draw()) this.run(); });
+    },
     mute() {
       this.muted = !this.muted;
       this.tones.mute(this.muted);
     },
+    /** Whether time is left. */
     draw() {
       const whole = this.state.of_s;
-      if (!whole) return;
       const left = Math.max(0, (this.endsAt - performance.now()) / 1000);
       this.$refs.ring.style.strokeDasharray = `${(AROUND * left) / whole} ${AROUND}`;
       const text = String(Math.ceil(left));
       if (this.$refs.seconds.textContent !== text) this.$refs.seconds.textContent = text;
+      return left > 0;
     },
     /** Names of the tones so far, for tests. */
     played() { return this.tones.played; },

@@ -11,7 +11,8 @@ const RAW = { color: 0x7c3aed, roughness: 0.8, transparent: true, opacity: 0.42,
 const RAW_THICKNESS = 1.12;
 const GHOST_THICKNESS = 1.35; // a shell around the hand where both are in one place
 const BESIDE_LIVE = 0.45, ALONE = 0.9; // opacity of what to do
-const TO_AND_FRO_S = 2.4, FOLLOWS_S = 0.12, GHOST_EVERY_S = 1 / 35;
+const TO_AND_FRO_S = 2.4, FOLLOWS_S = 0.12;
+const GHOST_EVERY_MS = 28, BESIDE_LIVE_MS = 50; // live poses come sooner: one picture shows both
 const TAG_AWAY = 16; // px from a joint to its angle
 const FEED_FIELDS = 2; // number of rotations, number of sensors
 
@@ -30,7 +31,7 @@ export default {
   },
   data: () => ({ shows: false, rawShows: false, tagged: false }),
   mounted() {
-    this.stage = new Stage(this.$refs.canvas, OrbitControls);
+    this.stage = new Stage(this.$refs.canvas, OrbitControls, () => this.prepare());
     this.look(this.from);
     if (!this.feed) this.stage.zoom(NEARER); // a comparison is about millimetres
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -39,20 +40,13 @@ export default {
     this.updates = 0;
     this.spans = new Map(); // of each sensor's readings so far: [least, greatest]
     this.build();
-    const frame = () => {
-      if (this.gone) return;
-      this.haunt(performance.now() / 1000);
-      if (this.stage.dirty) this.tag();
-      this.stage.draw();
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
     if (this.feed) this.listen();
   },
   beforeUnmount() {
     this.gone = true;
     this.socket?.close();
     clearTimeout(this.again);
+    clearTimeout(this.later);
     this.clear();
     this.stage.dispose();
   },
@@ -61,6 +55,7 @@ export default {
       // Another ghost brings all properties anew.
       if (JSON.stringify(now) !== JSON.stringify(before)) this.build();
     },
+    ghost() { this.stage.redraw(); },
     raw() { this.showRaw(); },
     calibrated() { this.showHand(); },
   },
@@ -70,25 +65,31 @@ export default {
       this.hand = new Hand(this.skeleton);
       this.hand.root.visible = false;
       this.stage.scene.add(this.hand.root);
+      this.stage.redraw();
     },
-    /** The ghost goes to what it is to show; between two hands it goes to and fro. */
+    /** Before each picture; a ghost that moves wants another one. */
+    prepare() {
+      const wait = this.haunt(performance.now() / 1000);
+      this.tag();
+      clearTimeout(this.later);
+      if (wait) this.later = setTimeout(() => this.stage.redraw(), wait);
+    },
+    /** The ghost goes to what it is to show; between two hands it goes to and fro. In ms, when it has moved on;
+        null where it stays. */
     haunt(now) {
       const hands = this.ghost ?? [];
       if (!hands.length) {
-        if (this.second?.root.visible) {
-          this.second.root.visible = false;
-          this.stage.dirty = true;
-        }
-        return;
+        if (this.second) this.second.root.visible = false;
+        return null;
       }
       if (!this.second) {
         this.second = new Hand(this.skeleton, GHOST, GHOST_THICKNESS);
         this.second.root.renderOrder = 1;
         this.stage.scene.add(this.second.root);
         this.at = {};
+        this.opacity = null;
       }
       const passed = now - (this.haunted ?? 0);
-      if (passed < GHOST_EVERY_S) return;
       this.haunted = now;
       const turn = (now % TO_AND_FRO_S) / TO_AND_FRO_S;
       const stays = this.calm.matches; // somebody who does not want motion sees one hand, then the other
@@ -108,13 +109,16 @@ export default {
         furthest = Math.max(furthest, Math.abs(angle - (this.at[name] ?? 0)));
         this.at[name] = angle;
       }
-      const opacity = this.shows ? BESIDE_LIVE : ALONE;
-      if (furthest < 0.02 && opacity === this.opacity) return;
-      this.opacity = opacity;
-      this.second.fade(opacity);
-      this.second.root.visible = true;
-      this.second.pose(this.at);
-      this.stage.dirty = true;
+      const opacity = this.shows ? BESIDE_LIVE : ALONE, isThere = furthest < 0.02 && opacity === this.opacity;
+      if (!isThere) {
+        this.opacity = opacity;
+        this.second.fade(opacity);
+        this.second.root.visible = true;
+        this.second.pose(this.at);
+      }
+      if (stays && hands.length > 1) return 1000 * TO_AND_FRO_S * (turn < 0.5 ? 0.5 - turn : 1 - turn);
+      if (isThere && hands.length < 2) return null;
+      return this.shows ? BESIDE_LIVE_MS : GHOST_EVERY_MS;
     },
     clear() {
       for (const part of [this.hand, this.second, this.measured, this.gaps, this.rawHand]) {
@@ -145,7 +149,6 @@ export default {
         this.hand.pose(angles);
         this.colour(this.hand, deviations ?? {});
       }
-      this.stage.dirty = true;
     },
     colour(hand, deviations) {
       const mixed = new THREE.Color();
@@ -158,7 +161,7 @@ export default {
     },
     showHand() {
       this.hand.root.visible = this.shows && this.calibrated;
-      this.stage.dirty = true;
+      this.stage.redraw();
     },
     /** Note how far each sensor's readings go; `readings` by sensor. */
     span(readings) {
@@ -206,7 +209,7 @@ export default {
       }
       if (this.rawHand) {
         this.rawHand.root.visible = shows;
-        this.stage.dirty = true;
+        this.stage.redraw();
       }
     },
     /** The chosen joint's angle beside it. */
@@ -228,7 +231,7 @@ export default {
     choose(rotation) {
       this.chosen = rotation;
       if (this.hand) this.colour(this.hand, this.deviations ?? {});
-      this.stage.dirty = true;
+      this.stage.redraw();
     },
     /** What the page has drawn, for tests and the bench. */
     drawn() { return { drawn: this.stage.drawn, updates: this.updates }; },

@@ -172,10 +172,14 @@ export class TipGaps {
   }
 }
 
-/** The part of a hand's view that does not know what it shows: camera, light, turning, picking. */
+/** The part of a hand's view that does not know what it shows: camera, light, turning, picking.
+ *
+ * It draws when something has changed and the browser shows the page; `before` is called before each picture.
+ */
 export class Stage {
-  constructor(canvas, OrbitControls) {
+  constructor(canvas, OrbitControls, before) {
     this.canvas = canvas;
+    this.before = before;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 10, 4000);
@@ -186,9 +190,8 @@ export class Stage {
     this.scene.add(this.camera);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.target.set(85, 0, 0);
-    this.controls.addEventListener("change", () => (this.dirty = true));
+    this.controls.addEventListener("change", () => this.redraw());
     this.raycaster = new THREE.Raycaster();
-    this.dirty = true;
     this.drawn = 0;
     this.resizer = new ResizeObserver(() => this.resize());
     this.resizer.observe(canvas.parentElement);
@@ -202,7 +205,7 @@ export class Stage {
     const thumb = hand === "left" ? -1 : 1; // a left hand is the right one's mirror image
     this.camera.position.set(85 + away[0], thumb * away[1], away[2]);
     this.controls.update();
-    this.dirty = true;
+    this.redraw();
   }
 
   zoom(factor) {
@@ -210,7 +213,7 @@ export class Stage {
     offset.setLength(Math.min(1500, Math.max(150, offset.length() * factor)));
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
-    this.dirty = true;
+    this.redraw();
   }
 
   resize() {
@@ -223,7 +226,7 @@ export class Stage {
     const narrow = Math.max(1, 0.95 / this.camera.aspect);
     this.camera.fov = 2 * Math.atan(Math.tan((FIELD_DEG / 2) * RADIANS) * narrow) / RADIANS;
     this.camera.updateProjectionMatrix();
-    this.dirty = true;
+    this.redraw();
   }
 
   /** Where a joint is seen, in px from the canvas' upper left corner. */
@@ -246,14 +249,18 @@ export class Stage {
     return names.sort((one, other) => one.endsWith("_ABD") - other.endsWith("_ABD"));
   }
 
-  draw() {
-    if (!this.dirty) return;
-    this.dirty = false;
-    this.drawn += 1;
-    this.renderer.render(this.scene, this.camera);
+  /** Several changes before the browser's next frame are one picture. */
+  redraw() {
+    this.waits ||= requestAnimationFrame(() => {
+      this.waits = 0;
+      this.before();
+      this.drawn += 1;
+      this.renderer.render(this.scene, this.camera);
+    });
   }
 
   dispose() {
+    cancelAnimationFrame(this.waits);
     this.resizer.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
