@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import secrets
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from multiprocessing.context import SpawnProcess
-from typing import Any, TypeVar
+from functools import cache
+from multiprocessing import forkserver, reduction
+from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING, Any, TypeVar
+from unittest.mock import patch
 
 import numpy as np
 import zenoh
@@ -25,9 +29,14 @@ from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
+from glovecal_service.jobs.workers import CONFIG, IMPORTED_ONCE
+from glovecal_service.operating_system import FORKS
 from glovecal_service.serve import Lifeline, Work, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkServerContext, SpawnContext
 
 LAYOUT = Layout.from_toml("""
 name = "three-bends"
@@ -40,7 +49,6 @@ M_MCP = ["M_MCP", "I_MCP"]
 """)
 
 Value = TypeVar("Value")
-_SPAWN = multiprocessing.get_context("spawn")
 
 
 def free_endpoint() -> str:
@@ -58,12 +66,63 @@ def eventually(condition: Callable[[], Value | None], what: str, deadline_s: flo
     return value
 
 
+PARTS = [
+    "glovecal_service.serve", "glovecal_service.realtime.process", "glovecal_service.recorder.recorder",
+    "glovecal_service.rest.app", "glovecal_service.studio.mount",
+]  # fmt: skip
+_OF_WORKERS = "distributed.nanny.pre-spawn-environ."
+
+
+@cache
+def _context() -> ForkServerContext | SpawnContext:
+    """Parts of the service are forked from a process that has imported what they need and opened no session,
+    as ``glovecal serve`` forks them: a fresh interpreter imports for two to four seconds.
+
+    A process has one to fork from: workers of jobs come from it, too, and find it as they want it.
+    """
+    if not FORKS:
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([*PARTS, *IMPORTED_ONCE])
+    for_workers = {
+        name.removeprefix(_OF_WORKERS): str(value)
+        for name, value in CONFIG.items()
+        if name.startswith(_OF_WORKERS)
+    }
+    with patch.dict(os.environ, for_workers):
+        forkserver.ensure_running()
+    return context
+
+
+class _Stream:
+    """A standard stream of the test: the forked process writes to it as well, so that pytest has it."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+
+    def __reduce__(self) -> tuple[Callable[..., None], tuple[Any, int]]:
+        return _take_over, (reduction.DupFd(self._number), self._number)
+
+
+def _take_over(sent: Any, number: int) -> None:
+    arrived = sent.detach()
+    os.dup2(arrived, number)
+    os.close(arrived)
+
+
+def _run(_streams: Any, work: Work, settings: Settings, ready: Any, lifeline: Lifeline) -> None:
+    run_part(work, settings, ready, lifeline)
+
+
 @contextmanager
-def part_of_service(work: Work, settings: Settings) -> Iterator[SpawnProcess]:
+def part_of_service(work: Work, settings: Settings) -> Iterator[BaseProcess]:
     """One of the service's processes, ready, as ``glovecal serve`` starts it."""
-    ready = _SPAWN.Event()
-    end, held = _SPAWN.Pipe(duplex=False)
-    process = _SPAWN.Process(target=run_part, args=(work, settings, ready, Lifeline(end, None)))
+    context = _context()
+    ready = context.Event()
+    end, held = context.Pipe(duplex=False)
+    streams = tuple(map(_Stream, (1, 2))) if FORKS else ()
+    arguments = (streams, work, settings, ready, Lifeline(end, None))
+    process = context.Process(target=_run, args=arguments)
     process.start()
     try:
         assert ready.wait(120), "the process did not get ready"

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +86,7 @@ class Stage:
         with Store.open(self.settings[0]) as store:
             self.model = store_model(store, "anna", degrees_per_count=0.5)
         self.names = [f"glove{number}" for number in range(gloves)]
-        self.processes: dict[str, tuple[ExitStack, SpawnProcess]] = {}
+        self.processes: dict[str, tuple[ExitStack, BaseProcess]] = {}
 
     def start(self, name: str, work: Work, settings: Settings) -> None:
         opened = ExitStack()

@@ -91,6 +91,7 @@ def test_while_capture_is_away_too_it_is_incomplete_and_repaired_as_soon_as_it_i
     """Recorder and capture killed; another run of capture begins before the stop, a third one comes later."""
     with open_router([settings.zenoh]):
         with capture_process(settings) as capture:
+            goes_on(settings, 1)  # it can say its sensors before the recording begins
             with part_of_service(recorder, settings) as process:
                 id = begun(store, "both killed")
                 goes_on(settings, 80)
@@ -147,6 +148,7 @@ def test_capture_that_ended_by_itself_leaves_a_complete_take(settings: Settings,
 def test_what_the_log_does_not_have_is_missing_for_good(settings: Settings, store: Store) -> None:
     with open_router([settings.zenoh]):
         with capture_process(settings) as capture:
+            goes_on(settings, 1)  # it can say its sensors before the recording begins
             with part_of_service(recorder, settings) as process:
                 id = begun(store, "log removed")
                 goes_on(settings, 60)

@@ -8,7 +8,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -29,7 +29,7 @@ class Service:
 
     settings: Settings
     recorder: Work = quick_recorder
-    process: SpawnProcess | None = None
+    process: BaseProcess | None = None
     opened: ExitStack | None = None
 
     def start(self) -> None:
