@@ -20,7 +20,7 @@ from other_gloves import displaced, other_hand
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import DatabaseSettings
-from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, STAGES, HandState
+from glovecal_models.colour_glove.hand_state import DEGREES_OF_FREEDOM, FINGER_ROTATIONS, STAGES, HandState
 from glovecal_models.colour_glove.lookup import PoseLookup
 from glovecal_models.colour_glove.photograph import (
     CONE_DEG,
@@ -29,6 +29,7 @@ from glovecal_models.colour_glove.photograph import (
     some_light,
 )
 from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_colours
+from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES, fitted_hand_shape
 from glovecal_models.colour_glove.pose.hand_tracker import (
     EVIDENCE,
     HandTracker,
@@ -39,16 +40,19 @@ from glovecal_models.colour_glove.pose.hand_tracker import (
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import HandSkin, posed
+from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, part
 from glovecal_models.worker_processes import work_off
 
-CLIPS = 48
-"""Each with a hand of its own."""
+CLIPS, FITTED_CLIPS = 48, 12
+"""Each with a hand of its own; of those whose shape is fitted first, which takes a minute each."""
 _APART, _CLOSE = (20, 1.5), (24, 30.0)
 """States of a clip and how many a second: nearly independent, and a sequence."""
 _EXPOSURE_S = 0.01
 _FOCAL_PX, _ASIDE_DEG, _MEETING_MM = (480.0, 680.0), (35.0, 90.0), 470.0
 """Of the drawn cameras: focal lengths at 640 pixels, how far aside the second stands, where both look."""
+_SHAPE_PICTURES = (MOST_PICTURES, 0.5)
+"""From which a shape is fitted: how many, and how many a second."""
 _LEAST_PIXELS = 400
 
 
@@ -80,6 +84,44 @@ def learned_errors(
     for stage in ("ik", "dense"):
         scales[scale_name(stage, True)] = fitted_scale(*_joined(following, stage))
     return replace(first, scales=scales)
+
+
+def learned_on_fitted_hands(
+    hand: PrintedHand, lookup: PoseLookup, cameras: int, errors: LearnedErrors, *, clips: int = FITTED_CLIPS
+) -> LearnedErrors:
+    """As ``errors``, but of hands whose shape was fitted: what the fit leaves. The fingers' joints of one
+    kind count together, as so few hands tell little of each."""
+    scene = _Scene(hand, cameras, drawn_colours(hand.skin, hand.pattern))
+    found = _over_clips(partial(_errors_when_fitted, scene, lookup, errors), clips, None, None, None)
+    kinds = [name.rpartition("_")[2] for name in FINGER_ROTATIONS] + ["turn"] * 3 + ["place"] * 3
+    scales = {}
+    for name in found[0]:
+        off, evidence = _joined(found, name)
+        whole = np.empty((DEGREES_OF_FREEDOM, len(EVIDENCE)))
+        for kind in dict.fromkeys(kinds):
+            columns = [column for column, other in enumerate(kinds) if other == kind]
+            whole[columns] = fitted_scale(
+                off[:, columns].reshape(-1, 1), evidence[:, columns].reshape(-1, 1, len(EVIDENCE))
+            )
+        scales[name] = whole
+    return replace(errors, scales={**errors.scales, **scales})
+
+
+def _errors_when_fitted(scene: _Scene, lookup: PoseLookup, errors: LearnedErrors, clip: int) -> _Errors:
+    """Of both ways of ``ik`` and ``dense``; nothing where the shape is refused."""
+    stages = ("ik", "dense")
+    seen = _clip(scene, 2000 + clip, *_SHAPE_PICTURES, motion=700)
+    nothing = np.empty((0, DEGREES_OF_FREEDOM)), np.empty((0, DEGREES_OF_FREEDOM, len(EVIDENCE)))
+    try:
+        fitted = fitted_hand_shape(HandTracker(scene.hand, lookup, seen.cameras, errors), seen.pictures)
+    except BadInput:
+        return {scale_name(stage, followed): nothing for stage in stages for followed in (False, True)}
+    own = PrintedHand(fitted.shape.skin(), scene.hand.pattern)
+    found = {}
+    for follows in (False, True):
+        of_stages = _errors(scene, lookup, errors, stages, follows, clip, own)
+        found |= {scale_name(stage, follows): those for stage, those in of_stages.items()}
+    return found
 
 
 def _over_clips(
@@ -131,12 +173,14 @@ class _Scene:
         return tuple(found)
 
 
-def _clip(scene: _Scene, seed: int, frames: int, rate_hz: float, cone_deg: float = CONE_DEG) -> _Clip:
-    """Photographs, their colours classified."""
+def _clip(
+    scene: _Scene, seed: int, frames: int, rate_hz: float, cone_deg: float = CONE_DEG, motion: int = 0
+) -> _Clip:
+    """Photographs, their colours classified; of another ``motion`` with the same hand, glove and room."""
     hand, cameras = scene.hand, scene.cameras(seed)
     other, rng = other_hand(hand.skin, seed), np.random.default_rng([seed, 4])
     seconds = np.arange(frames) / rate_hz
-    states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed, cone_deg=cone_deg)[:frames]
+    states = hand_motion(other, frames / rate_hz, rate_hz, seed=seed + motion, cone_deg=cone_deg)[:frames]
     glove, look = displaced(other, hand.pattern, seed), some_light(rng, ("skin", "sleeve")[seed % 2])
     rooms = [
         Photographer(other, glove, camera, look, seed + number * 1_000_000)
@@ -183,12 +227,13 @@ _Errors = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def _errors(
-    scene: _Scene, lookup: PoseLookup, errors: LearnedErrors, stages: Sequence[str], follows: bool, clip: int
-) -> _Errors:
-    """Per stage: errors (N, 26), evidence (N, 26, 6)."""
+    scene: _Scene, lookup: PoseLookup, errors: LearnedErrors, stages: Sequence[str], follows: bool, clip: int,
+    own: PrintedHand | None = None,
+) -> _Errors:  # fmt: skip
+    """Per stage: errors (N, 26), evidence (N, 26, 6). ``own``: the hand as it was fitted."""
     made, found = _clip(scene, 2000 + clip, *(_CLOSE if follows else _APART)), {}
     for stage in stages:
-        tracker = HandTracker(scene.hand, lookup, made.cameras, errors, stage=stage, follows=follows)
+        tracker = HandTracker(own or scene.hand, lookup, made.cameras, errors, stage=stage, follows=follows)
         errors_of, evidence_of = [], []
         for state, views, seconds in zip(made.states, made.pictures, made.seconds, strict=True):
             answer = tracker.answered(views, float(seconds))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulated_camera import lasting_noise
-from tracked_errors import correlations, table
+from tracked_errors import correlations, table, trailing_s
 from tracked_hands import TrackedHand, cameras
 
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
@@ -34,6 +36,14 @@ def test_how_large_and_how_lasting_errors_are_is_told():
     assert "In soft light 90 % of the glove's pixels are right" in text
     kinds = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")][1:]
     assert kinds == ["MCP", "PIP", "DIP", "IP", "TMC", "ABD", "VIR"]
+
+
+def test_how_late_estimates_come_is_told():
+    one = known(3, stays=0.5, lasts_s=0.8, times=0.5)
+    late = np.column_stack([np.interp(one.frames - 0.6, one.frames, column) for column in one.truth.T])
+    trailing = replace(one, error=one.error + late - one.truth)
+    assert trailing_s(trailing) - trailing_s(one) == pytest.approx(0.02, abs=0.003)
+    assert "ms late, SD" in table([one, trailing])
 
 
 def test_the_second_camera_looks_at_the_same_place_from_the_side():

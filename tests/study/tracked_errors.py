@@ -3,8 +3,9 @@
 Hands of other people in gloves sewn from the printed sheets (``worn_glove``), in rooms with soft and with
 hard light (``lit_glove``), before cameras with other lenses: drawn by nothing that the tracker is made from,
 and of other seeds than those that anything was chosen on. Each frame is tracked by one camera and by two, 60
-degrees apart. ``--learn`` learns the errors that the tracker states, on its own drawings, and writes the file
-that comes with the package.
+degrees apart, in the shape that was fitted to other moments of the same hand, as ``glovecal camera
+estimates`` does. ``--learn`` learns the errors that the tracker states, on its own drawings, and writes the
+file that comes with the package.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from error_learning import CLIPS, learned_errors
+from error_learning import CLIPS, learned_errors, learned_on_fitted_hands
 from lit_glove import HARD, SOFT
 from simulated_camera import ERRORS, towards_prior
-from tracked_hands import RATE_HZ, SECONDS, Study, TrackedHand, tracked
+from tracked_hands import FIRST_SEED, RATE_HZ, SECONDS, Study, TrackedHand, tracked
 
 from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
@@ -57,7 +58,7 @@ def table(hands: Sequence[TrackedHand]) -> str:
         f"{100 * float((np.abs(error[accepted]) > _FARTHER_DEG).mean()):.1f} % off by over 20 degrees.",
         _by_light(hands),
         f"Errors last {lasts:.2f} s; {100 * plateau:.0f} % of their variance stays as long as the hand "
-        f"does; lean to the prior {_lean(score, lean):.2f} of the deviation.",
+        f"does; lean to the prior {_lean(score, lean):.2f} of the deviation. {_by_motion(hands)}",
         "",
         "| joint | accepted | RMS error, degrees | median stated SD, degrees | error over stated | lean | "
         "mean error at little, middle, deep flexion, degrees |",
@@ -95,7 +96,8 @@ def _by_light(hands: Sequence[TrackedHand]) -> str:
             )
     bones = [hand.bones for hand in hands if hand.bones is not None]
     if bones:
-        said.append(f"Lengths of bones are off by {100 * float(np.mean(bones)):.1f} %, RMS.")
+        off, stated = 100.0 * np.mean(bones, axis=0)
+        said.append(f"Lengths of bones are off by {off:.1f} %, RMS; {stated:.1f} % are stated.")
     return " ".join(said)
 
 
@@ -111,6 +113,23 @@ def correlations(hands: Sequence[TrackedHand]) -> tuple[np.ndarray, np.ndarray]:
             products[lag] += np.nansum(both)
             counts[lag] += np.isfinite(both).sum()
     return lags / RATE_HZ, products / np.maximum(counts, 1) / (products[0] / max(counts[0], 1))
+
+
+def trailing_s(hand: TrackedHand) -> float:
+    """By how much estimates come late: the regression of errors on the true angles' speed, by the stated
+    deviations; what stays is taken off. Frames that follow one another only."""
+    speed = np.gradient(hand.truth, hand.frames / RATE_HZ, axis=0)
+    weight = np.where(np.gradient(hand.frames)[:, None] == 1.0, hand.sd**-2.0, 0.0)
+    off = hand.error - hand.error.mean(axis=0)
+    return float(-(weight * off * speed).sum() / (weight * speed**2).sum())
+
+
+def _by_motion(hands: Sequence[TrackedHand]) -> str:
+    late_ms = [1e3 * trailing_s(hand) for hand in hands if len(hand.frames) > 1]
+    if len(late_ms) < 2:
+        return ""
+    mean, spread = np.mean(late_ms), np.std(late_ms, ddof=1)
+    return f"Estimates come {mean:+.1f} ms late, SD {spread:.1f} ms between hands."
 
 
 def _lean(score: np.ndarray, lean: np.ndarray) -> float:
@@ -137,9 +156,8 @@ def main(arguments: Sequence[str]) -> int:
     )
     parser.add_argument("--hands", type=int, default=16, help="each for 5 s (default 16)")
     parser.add_argument("--folder", type=Path, default=Path(".study"), help="for database and table")
-    parser.add_argument(
-        "--shapes", action="store_true", help="each hand's shape is fitted to 30 other pictures of it first"
-    )
+    parser.add_argument("--unfitted", action="store_true", help="no hand's shape is fitted first")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the first hand")
     parser.add_argument("--learn", action="store_true", help="write what the tracker states of its errors")
     parser.add_argument("--smoke", action="store_true", help="two hands for half a second, a small database")
     options = parser.parse_args(arguments)
@@ -153,36 +171,44 @@ def main(arguments: Sequence[str]) -> int:
     if options.learn:
         learn(database, CLIPS)
         return 0
-    text = report(database, options.hands, SECONDS, entries=ENTRIES, fits_shape=options.shapes)
+    text = report(
+        database, options.hands, SECONDS, entries=ENTRIES, fits_shape=not options.unfitted,
+        first_seed=options.first_seed,
+    )  # fmt: skip
     print(text)
-    name = "camera-errors-shapes.md" if options.shapes else "camera-errors.md"
+    name = "camera-errors-unfitted.md" if options.unfitted else "camera-errors.md"
     (options.folder / name).write_text(text, encoding="utf-8")
     return 0
 
 
-def report(folder: Path, hands: int, seconds: float, *, entries: int, fits_shape: bool = False) -> str:
+def report(
+    folder: Path, hands: int, seconds: float, *, entries: int, fits_shape: bool = False,
+    first_seed: int = FIRST_SEED,
+) -> str:  # fmt: skip
     text = "# The tracker's errors: hands, gloves and pictures that it never saw\n"
     for count, name in ((1, "One camera"), (2, "Two cameras")):
-        study = Study(folder, count, seconds, entries, fits_shape)
+        study = Study(folder, count, seconds, entries, fits_shape, first_seed)
         _ = study.tracker, study.colours  # made once, not in each process
-        found: dict[int, TrackedHand | None] = {}
+        found: dict[int, TrackedHand] = {}
         work_off(partial(tracked, study), range(hands), os.cpu_count() or 1, found.__setitem__, "tracking")
-        those = [hand for _, hand in sorted(found.items()) if hand is not None]
-        refused = f"{hands - len(those)} of {hands} shapes were refused. " if fits_shape else ""
-        text += f"\n## {name}\n\n{refused}{table(those)}\n"
+        those = [hand for _, hand in sorted(found.items())]
+        refused = sum(hand.bones is None for hand in those)
+        said = f"{refused} of {hands} shapes were refused. " if fits_shape else ""
+        text += f"\n## {name}\n\n{said}{table(those)}\n"
     return text
 
 
 def learn(folder: Path, clips: int) -> None:
-    """Half an hour of drawing: for one camera and two."""
+    """An hour of drawing: for one camera and two, of hands as they are assumed and as they are fitted."""
     hand, arrays = PrintedHand(hand_skin(), printed_pattern()), {}
     poses, settings = generated_poses(PAPER_COUNT), DatabaseSettings(entries=ENTRIES)
     database = pose_database(hand.skin, hand.pattern, poses, folder, settings)
     lookup = PoseLookup(database, pca_code(database.transforms))
     for count in (1, 2):
         learned = learned_errors(hand, lookup, count, clips=clips)
-        beginning = shipped_name(count)
-        arrays |= {beginning + name: array.astype(np.float32) for name, array in learned.arrays().items()}
+        fitted = learned_on_fitted_hands(hand, lookup, count, learned)
+        for beginning, each in ((shipped_name(count), learned), (shipped_name(count, True), fitted)):
+            arrays |= {beginning + name: array.astype(np.float32) for name, array in each.arrays().items()}
     np.savez_compressed(SHIPPED, allow_pickle=False, **arrays)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,12 +12,12 @@ from lit_glove import HARD, SOFT, LitGlove, a_light, free_motion, other_camera
 from worn_glove import ROTATIONS, WornGlove, family
 
 from glovecal_models.colour_glove.camera_model import Camera
+from glovecal_models.colour_glove.hand_shape import HandShape
 from glovecal_models.colour_glove.hand_state import FINGER_ROTATIONS
 from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_colours
 from glovecal_models.colour_glove.pose.both_ways import followed_both_ways
-from glovecal_models.colour_glove.pose.hand_shape_fit import fitted_hand_shape
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker
-from glovecal_models.colour_glove.pose.window_view import PrintedHand
+from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES, fitted_hand_shape
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker, with_shape
 from glovecal_models.errors import BadInput
 
 RATE_HZ, SECONDS = 30.0, 5.0
@@ -25,7 +25,7 @@ FIRST_SEED = 9000
 """What was chosen was chosen on seeds 500 to 599."""
 ASIDE_DEG, AROUND_MM = 60.0, 470.0
 """The second camera looks at the same place from the side."""
-SHAPE_PICTURES = 30
+SHAPE_HZ = 0.5
 _ORDER = [ROTATIONS.index(name) for name in FINGER_ROTATIONS]
 
 
@@ -42,8 +42,9 @@ class TrackedHand:
     accepted: np.ndarray
     pixels: tuple[int, int]
     """Of the glove: rightly labelled, all."""
-    bones: float | None
-    """RMS error of its bones' lengths, relative, where its shape was fitted."""
+    bones: tuple[float, float] | None
+    """RMS error of its bones' lengths, relative to the hand's size, and the stated one; None where no shape
+    was fitted, or it was refused."""
 
 
 def cameras(count: int) -> tuple[Camera, ...]:
@@ -84,9 +85,8 @@ class Study:
         return ColourTable.load(file)
 
 
-def tracked(study: Study, number: int) -> TrackedHand | None:
-    """A hand of its own, followed both ways at stage dense; None where its shape was to be fitted and was
-    refused."""
+def tracked(study: Study, number: int) -> TrackedHand:
+    """A hand of its own, followed both ways at stage dense, in the shape that 50 moments of 100 s give."""
     seed, light = study.first_seed + number, (SOFT, HARD)[number % 2]
     glove = family(number + 1, study.first_seed)[number]
     rooms = [
@@ -95,20 +95,18 @@ def tracked(study: Study, number: int) -> TrackedHand | None:
     ]
     first, bones = study.tracker, None
     if study.fits_shape:
-        angles, turns, places = free_motion(2.0 * SHAPE_PICTURES, 0.5, seed + 400)
+        angles, turns, places = free_motion(MOST_PICTURES / SHAPE_HZ, SHAPE_HZ, seed + 400)
         views = [
             [study.colours.labels(room.picture(*moment, 1000 + index)[0]) for room in rooms]
             for index, moment in enumerate(zip(angles, turns, places, strict=True))
         ]
         try:
-            shape = fitted_hand_shape(first, views)
-        except BadInput:
-            return None
-        bones = _bones_off(shape.sizes_mm, glove)
-        fitted = PrintedHand(shape.skin, first.hand.pattern)
-        first = prepared_tracker(
-            study.folder / str(number), first.cameras, hand=fitted, entries=study.entries
-        )
+            fitted = fitted_hand_shape(first, views)
+        except BadInput:  # the command goes on without
+            pass
+        else:
+            bones = _bones_off(fitted.shape, glove)
+            first = with_shape(first, fitted.shape)
     angles, turns, places = free_motion(study.seconds, RATE_HZ, seed)
     right = [0, 0]
 
@@ -136,7 +134,8 @@ def tracked(study: Study, number: int) -> TrackedHand | None:
     return TrackedHand(light, frames, true, errors, deviations, accepted, pixels, bones)
 
 
-def _bones_off(sizes_mm: Mapping[str, float], glove: WornGlove) -> float:
-    names = [name for name in sizes_mm if name.endswith(("proximal", "middle"))]
-    off = [sizes_mm[name] / glove.sizes_mm[name] for name in names]
-    return float(np.std(off) / np.mean(off))
+def _bones_off(shape: HandShape, glove: WornGlove) -> tuple[float, float]:
+    names = [name for name in shape.sizes_mm if name.endswith(("proximal", "middle"))]
+    off = [shape.sizes_mm[name] / glove.sizes_mm[name] for name in names]
+    stated = np.mean([max(0.0, shape.bones_sd[name] ** 2 - shape.size_sd**2) for name in names])
+    return float(np.std(off) / np.mean(off)), float(np.sqrt(stated))

@@ -7,7 +7,7 @@ several hands; so a pattern is one for all of them. The left hand is the mirror 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -19,7 +19,7 @@ from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import ASSUMED_LENGTH_MM
 from glovecal_models.hand.forward_kinematics import forward_kinematics
 from glovecal_models.hand.rotations import FINGERS, HAND_ROTATIONS
-from glovecal_models.hand.skeleton import Skeleton, hand_skeleton
+from glovecal_models.hand.skeleton import Skeleton, hand_skeleton, mirrored
 from glovecal_models.names import did_you_mean
 
 CELL_MM = 3.6
@@ -40,6 +40,9 @@ RADII_MM: dict[str, tuple[float, float]] = {
     "W_thumbward": (19.0, 18.0), "W_pinkyward": (19.0, 18.0),
 }  # fmt: skip
 """Of the assumed hand in the glove, at the beginning and the end of each bone; ours, by the look of hands."""
+LAID = ("along", "around", "across", "above")
+"""How flesh and cloth about a bone lie aside: along it and, on its surface, around it, as cloth slips and
+turns; across it and above it, as a bone lies in its flesh; mm in the frame of the right hand's bone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +79,15 @@ class HandSkin:
 
 
 def hand_skin(
-    skeleton: Skeleton | None = None, radii_mm: Mapping[str, tuple[float, float]] | None = None
+    skeleton: Skeleton | None = None,
+    radii_mm: Mapping[str, tuple[float, float]] | None = None,
+    laid_mm: Mapping[str, Sequence[float]] | None = None,
 ) -> HandSkin:
     """The skin of a hand with a rigid palm; without ``radii_mm`` they grow with the hand's length.
 
-    ``radii_mm`` gives some bones' radii at both ends; names are those of ``RADII_MM``. Raises BadInput for an
-    unknown bone, a radius that is not above 0, and an arching palm.
+    ``radii_mm`` gives some bones' radii at both ends, ``laid_mm`` how cloth and flesh lie aside about some
+    (``LAID``); names are those of ``RADII_MM``. Raises BadInput for an unknown bone, a radius that is not
+    above 0, numbers that are not finite, and an arching palm.
     """
     skeleton = hand_skeleton() if skeleton is None else skeleton
     if skeleton.rotations != HAND_ROTATIONS:
@@ -94,9 +100,16 @@ def hand_skin(
         if len(ends) != 2 or not all(np.isfinite(ends)) or not min(ends) > 0:
             raise BadInput(f"radii of {name} are {ends}; two numbers above 0 mm are expected")
         radii[name] = (float(ends[0]), float(ends[1]))
+    laid = np.zeros((len(radii), len(LAID)))
+    for name, aside in (laid_mm or {}).items():
+        if name not in radii:
+            raise BadInput(f"a hand has no bone {name!r}; {did_you_mean(name, radii)}")
+        if len(aside) != len(LAID) or not np.isfinite(aside).all():
+            raise BadInput(f"{name} lies aside by {aside}; {len(LAID)} finite numbers are expected, mm")
+        laid[list(radii).index(name)] = aside
     template = _template()
-    right = hand_skeleton(skeleton.dimensions)
-    vertices = _stretched(template, _bones(right, radii))
+    right = skeleton if skeleton.hand == "right" else mirrored(skeleton)
+    vertices = _stretched(template, _bones(right, radii), laid)
     triangles = template.triangles
     if skeleton.hand == "left":
         vertices, triangles = vertices * (1.0, -1.0, 1.0), np.ascontiguousarray(triangles[:, ::-1])
@@ -266,19 +279,20 @@ def _bones(skeleton: Skeleton, radii: Mapping[str, tuple[float, float]]) -> tupl
     for side, name in ((1.0, "W_thumbward"), (-1.0, "W_pinkyward")):
         y = 0.13 * side * breadth
         ends[name] = ("W_FLEX", np.array([-0.08 * length, y, 0.0]), np.array([0.10 * length, y, 0.0]))
-    bones = []
-    for name, radius in radii.items():
-        joint, start, stop = ends[name]
-        arm = stop - start
-        along = arm / np.linalg.norm(arm)
-        nail = frames.orientations[0, place[joint]][:, 2]
-        across = np.cross(nail, along)
-        across /= np.linalg.norm(across)
-        frame = np.column_stack([along, across, np.cross(along, across)])
+    starts, stops = (np.array([ends[name][end] for name in radii]) for end in (1, 2))
+    joints = [place[ends[name][0]] for name in radii]
+    lengths = np.linalg.norm(stops - starts, axis=1)
+    along = (stops - starts) / lengths[:, None]
+    across = np.cross(frames.orientations[0, joints][:, :, 2], along)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    turned = np.stack([along, across, np.cross(along, across)], axis=2)
+    return tuple(
         # A tip is where its flesh ends: the cone stops a radius before.
-        inside = radius[1] if name.endswith("distal") else 0.0
-        bones.append(_Bone(name, place[joint], frame, start, float(np.linalg.norm(arm)) - inside, radius))
-    return tuple(bones)
+        _Bone(name, joint, frame, start, length - (radius[1] if name.endswith("distal") else 0.0), radius)
+        for (name, radius), joint, frame, start, length in zip(
+            radii.items(), joints, turned, starts, lengths.tolist(), strict=True
+        )
+    )
 
 
 @cache
@@ -362,13 +376,19 @@ def _bone_weights(bones: tuple[_Bone, ...], vertices: np.ndarray, triangles: np.
     return weights
 
 
-def _stretched(template: _Template, bones: tuple[_Bone, ...]) -> np.ndarray:
-    """The template's surface on other bones: along each by its length, across by its radius."""
-    found = np.zeros_like(template.vertices_mm)
+def _stretched(template: _Template, bones: tuple[_Bone, ...], laid_mm: np.ndarray) -> np.ndarray:
+    """The template's surface on other bones: along each by its length, across by its radius; then aside by
+    ``laid_mm`` (B, 4), of ``LAID``."""
+    carried = np.empty((len(bones), 3, 4))
     for column, (old, new) in enumerate(zip(template.bones, bones, strict=True)):
-        local = (template.vertices_mm - old.start_mm) @ old.frame
         thicker = sum(new.radii_mm) / sum(old.radii_mm)
-        scale = np.array([new.length_mm / old.length_mm, thicker, thicker])
-        moved = (local * scale) @ new.frame.T + new.start_mm
-        found += template.bone_weights[:, [column]] * moved
-    return found
+        along, around, *beside = laid_mm[column]
+        angle = around / (0.5 * sum(new.radii_mm))
+        sine, cosine = np.sin(angle), np.cos(angle)
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        scaled = np.diag([new.length_mm / old.length_mm, thicker, thicker]) @ old.frame.T
+        whole = new.frame @ turn @ scaled
+        carried[column, :, :3] = whole
+        carried[column, :, 3] = new.start_mm + new.frame @ (along, *beside) - whole @ old.start_mm
+    blended = (template.bone_weights @ carried.reshape(len(bones), 12)).reshape(-1, 3, 4)
+    return np.einsum("vab,vb->va", blended[:, :, :3], template.vertices_mm) + blended[:, :, 3]

@@ -257,7 +257,7 @@ def hand_skeleton(
         for finger, last in lasts.items()
     ]
     right = Skeleton("right", dimensions, tuple(joints), tuple(tips))
-    return right if hand == "right" else _mirrored(right)
+    return right if hand == "right" else mirrored(right)
 
 
 def _wrist() -> list[Joint]:
@@ -330,8 +330,9 @@ def _turn(axis: Vector, angle_deg: float) -> Quaternion:
     return math.cos(half), x, y, z
 
 
-def _mirrored(right: Skeleton) -> Skeleton:
-    """In y = 0. An axis and its angle are mirrored so that the same rotation means the same motion."""
+def mirrored(skeleton: Skeleton) -> Skeleton:
+    """The other hand, in y = 0. An axis and its angle are mirrored so that the same rotation means the same
+    motion."""
 
     def place(vector: Vector) -> Vector:
         return vector[0], -vector[1], vector[2]
@@ -346,10 +347,11 @@ def _mirrored(right: Skeleton) -> Skeleton:
             orientation=(joint.orientation[0], *axis(joint.orientation[1:])),
             axis=axis(joint.axis),
         )
-        for joint in right.joints
+        for joint in skeleton.joints
     ]
-    tips = [replace(tip, offset_mm=place(tip.offset_mm)) for tip in right.tips]
-    return Skeleton("left", right.dimensions, tuple(joints), tuple(tips))
+    tips = [replace(tip, offset_mm=place(tip.offset_mm)) for tip in skeleton.tips]
+    other: Handedness = "left" if skeleton.hand == "right" else "right"
+    return Skeleton(other, skeleton.dimensions, tuple(joints), tuple(tips))
 
 
 def skeleton_document(skeleton: Skeleton) -> dict[str, Any]:

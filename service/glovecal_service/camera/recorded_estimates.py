@@ -23,7 +23,13 @@ from glovecal_client.pictures.video_file import SUFFIXES as VIDEOS
 from glovecal_models.colour_glove.hand_state import PoseEstimate, camera_estimates
 from glovecal_models.colour_glove.pictures.picture_check import light_advice, shadowed
 from glovecal_models.colour_glove.pose.both_ways import Follows, followed_both_ways
-from glovecal_models.colour_glove.pose.hand_shape_fit import MOST_PICTURES
+from glovecal_models.colour_glove.pose.hand_shape_fit import (
+    MEASURED_SIZE_SD,
+    MOST_PICTURES,
+    SIZE_SD,
+    FittedShape,
+    fitted_hand_shape,
+)
 from glovecal_models.errors import BadInput
 from glovecal_models.progress import Cancel, Report, stop_if
 from glovecal_models.takes.camera_estimates import MOST_FRAMES, CameraEstimates, without_repeats
@@ -155,9 +161,21 @@ class Recordings:
             dict(found), time.perf_counter() - began, light_advice(shadows),
         )  # fmt: skip
 
-    def spread_labels(self, setup: TrackingSetup, count: int = MOST_PICTURES) -> list[list[np.ndarray]]:
-        """Label images of ``count`` moments over the whole recording, one of each camera."""
-        wanted = np.unique(np.linspace(0, len(self.rows[0]) - 1, min(count, len(self.rows[0]))).astype(int))
+    def fitted_shape(
+        self, setup: TrackingSetup, *, is_measured: bool, report: Report | None = None,
+        cancelled: Cancel | None = None,
+    ) -> FittedShape:  # fmt: skip
+        """Of the hand in its glove, from moments spread over the whole recording. ``is_measured``: somebody
+        measured the hand's length. Raises BadInput where no shape is sure, Cancelled."""
+        size_sd = MEASURED_SIZE_SD if is_measured else SIZE_SD
+        return fitted_hand_shape(
+            setup.first, self._spread_labels(setup), size_sd=size_sd, report=report, cancelled=cancelled
+        )
+
+    def _spread_labels(self, setup: TrackingSetup) -> list[list[np.ndarray]]:
+        """Label images of as many moments as a shape is fitted to, one of each camera."""
+        frames = len(self.rows[0])
+        wanted = np.unique(np.linspace(0, frames - 1, min(MOST_PICTURES, frames)).astype(int))
         readers = [
             _Reader(source, rows[wanted]) for source, rows in zip(self.sources, self.rows, strict=True)
         ]

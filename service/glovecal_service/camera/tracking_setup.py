@@ -12,7 +12,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -24,6 +24,7 @@ from glovecal_client.operating_system import move_over
 from glovecal_client.pictures.label_file import LabelFilePictures
 from glovecal_client.pictures.source import PictureSource, RenderedPictures, build_source
 from glovecal_models.colour_glove.camera_model import Camera, read_cameras
+from glovecal_models.colour_glove.hand_shape import HandShape, read_shape
 from glovecal_models.colour_glove.hand_state import HandState
 from glovecal_models.colour_glove.pattern import COLOURS, Pattern, printed_pattern
 from glovecal_models.colour_glove.photograph import (
@@ -34,8 +35,7 @@ from glovecal_models.colour_glove.pictures.classify import ColourTable, drawn_co
 from glovecal_models.colour_glove.pictures.picture_check import PictureCheck
 from glovecal_models.colour_glove.pictures.white_balance import CardColours, Gains, blind_gains
 from glovecal_models.colour_glove.pose.both_ways import Follows
-from glovecal_models.colour_glove.pose.hand_shape_fit import read_shape
-from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker
+from glovecal_models.colour_glove.pose.hand_tracker import HandTracker, prepared_tracker, with_shape
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.pose_set import hand_shapes
 from glovecal_models.colour_glove.rasterise import rasterise
@@ -104,7 +104,7 @@ def _read(file: Path, how: int) -> np.ndarray | None:
 
 
 ASSUMED = Camera()
-LEARNED = 2
+LEARNED = 3
 """Grows when what is learned from drawn photographs, colours and errors, is learned anew."""
 
 
@@ -152,6 +152,11 @@ class TrackingSetup:
         first = self.first
         return HandTracker(first.hand, first.lookup, first.cameras, first.errors, stage=stage)
 
+    def fitted(self, shape: HandShape) -> TrackingSetup:
+        """For the same hand in its fitted shape."""
+        first = with_shape(self.first, shape)
+        return replace(self, hand=first.hand, first=first, made_from=repr((self.made_from, shape)))
+
     def example(self) -> np.ndarray:
         """Labels of a hand before the first camera: what kernels are compiled with before pictures wait."""
         skin, glove = self.hand.skin, RenderedGlove(self.hand, self.cameras[0])
@@ -173,7 +178,7 @@ def tracking_setup(
 
     Raises DeviceLost where no picture comes, BadInput for files that cannot be used, Cancelled.
     """
-    hand = PrintedHand(_skin(settings), printed_pattern())
+    hand = _hand(settings)
     built = tuple(
         camera_source(source, lambda: RenderedGlove(hand, ASSUMED)) if isinstance(source, str) else source
         for source in sources
@@ -190,9 +195,10 @@ def tracking_setup(
     is_known = settings.calibration is not None or built[0].name == RENDERED
     colours = settings.colours
     table = glove_colours(settings.folder, hand) if colours is None else ColourTable.load(colours)
-    return TrackingSetup(
+    setup = TrackingSetup(
         built, hand, cameras, tuple(sizes), is_known, table, check, first, made_from, settings.mirrored
     )
+    return setup if settings.shape is None else setup.fitted(_shape(settings.shape, settings.hand))
 
 
 def prepared(
@@ -201,21 +207,24 @@ def prepared(
     """Build what ``tracking_setup`` needs besides pictures, where it is not there yet; the folder it is in.
 
     Raises BadInput, Cancelled."""
-    hand = PrintedHand(_skin(settings), printed_pattern())
+    hand = _hand(settings)
     prepared_tracker(settings.folder, hand=hand, entries=settings.entries, report=report, cancelled=cancelled)
     glove_colours(settings.folder, hand)
     return settings.folder
 
 
-def _skin(settings: TrackingSettings) -> HandSkin:
-    """The hand to be tracked."""
-    if settings.shape is None:
-        sizes = HandDimensions.from_measured(settings.sizes_mm)
-        return hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
-    shape = read_shape(settings.shape)
-    if shape.hand != settings.hand:
-        raise BadInput(f"{settings.shape} is of a {shape.hand} hand; the {settings.hand} one wears the glove")
-    return shape.skin()
+def _hand(settings: TrackingSettings) -> PrintedHand:
+    """The hand to be tracked, by its sizes."""
+    sizes = HandDimensions.from_measured(settings.sizes_mm)
+    skin = hand_skin(hand_skeleton(sizes, "left" if settings.hand == "left" else "right"))
+    return PrintedHand(skin, printed_pattern())
+
+
+def _shape(file: Path, hand: str) -> HandShape:
+    shape = read_shape(file)
+    if shape.hand != hand:
+        raise BadInput(f"{file} is of a {shape.hand} hand; the {hand} one wears the glove")
+    return shape
 
 
 def _size(source: PictureSource) -> tuple[int, int]:

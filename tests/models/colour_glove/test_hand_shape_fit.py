@@ -12,7 +12,7 @@ from glovecal_models.colour_glove.photograph import hand_motion
 from glovecal_models.colour_glove.pose.dense import joint_equations, label_equations
 from glovecal_models.colour_glove.pose.hand_shape_fit import (
     PARAMETERS,
-    HandShape,
+    FittedShape,
     fitted_hand_shape,
     shaped,
 )
@@ -54,7 +54,7 @@ def pictures() -> list[list[np.ndarray]]:
 
 
 @pytest.fixture(scope="module")
-def shape(tracker: HandTracker, pictures: list[list[np.ndarray]]) -> HandShape:
+def shape(tracker: HandTracker, pictures: list[list[np.ndarray]]) -> FittedShape:
     return fitted_hand_shape(tracker, pictures, rounds=2)
 
 
@@ -65,10 +65,11 @@ def relative(sizes_mm) -> np.ndarray:
     return np.array([np.log(sizes_mm[name] / true[name]) for name in bones])
 
 
-def test_two_cameras_find_the_bones(shape: HandShape):
-    before, after = (relative(sizes) for sizes in (SKIN.skeleton.dimensions.sizes_mm, shape.sizes_mm))
-    assert np.sqrt((after**2).mean()) < 0.7 * np.sqrt((before**2).mean())
-    deviations = np.array(list(shape.bones_sd.values()))
+def test_two_cameras_find_the_bones(shape: FittedShape):
+    before, after = (relative(sizes) for sizes in (SKIN.skeleton.dimensions.sizes_mm, shape.shape.sizes_mm))
+    # Cloth that may lie aside explains a part of what longer bones would.
+    assert np.sqrt((after**2).mean()) < 0.8 * np.sqrt((before**2).mean())
+    deviations = np.array(list(shape.shape.bones_sd.values()))
     assert np.sqrt(((after / deviations) ** 2).mean()) < 2.0
     assert deviations.max() < 0.05
     assert shape.disagreeing < 0.8 * shape.disagreeing_before
@@ -78,7 +79,7 @@ def test_two_cameras_find_the_bones(shape: HandShape):
 def test_one_camera_leaves_the_size_open(tracker: HandTracker, pictures: list[list[np.ndarray]]):
     alone = HandTracker(HAND, tracker.lookup, CAMERAS[:1], tracker.errors)
     found = fitted_hand_shape(alone, [views[:1] for views in pictures], rounds=1, size_sd=0.05)
-    assert found.size_sd > 0.045
+    assert found.shape.size_sd > 0.045
     assert abs(found.values[0]) < 0.01
 
 
@@ -93,30 +94,35 @@ def test_skins_of_another_shape_move_as_the_equations_say():
     window = glove_window(labels)
     assert window is not None
     view, compared = WindowView.of(labels, window, CAMERAS[0]), 0
-    for index in (0, PARAMETERS.index("M_proximal"), PARAMETERS.index("I_metacarpal radius")):
+    for name, size in (
+        ("size", 0.06), ("M_proximal", 0.06), ("I_metacarpal radius", 0.06), ("M_proximal around", 2.0),
+        ("R_middle along", 2.0),
+    ):  # fmt: skip
         step = np.zeros(len(PARAMETERS))
-        step[index] = 0.06
+        step[PARAMETERS.index(name)] = size
         less, more = (shaped(SKIN, values + sign * step) for sign in (-1, 1))
-        motion = ((posed(more, state) - posed(less, state)) / 0.12)[:, :, None]
+        motion = ((posed(more, state) - posed(less, state)) / (2 * size))[:, :, None]
         drawn = [
             _Drawn(PrintedHand(skin, HAND.pattern), view, posed(skin, state), 11, 1).shares.ravel()
             for skin in (less, more)
         ]
-        expected = (drawn[1] - drawn[0]) / 0.12
+        expected = (drawn[1] - drawn[0]) / (2 * size)
         here = _Drawn(HAND, view, posed(SKIN, state), 11, 1)
         found = here.jacobian(state, motion)[:, 0]
-        if np.linalg.norm(expected) < 3.0:
+        if np.linalg.norm(expected) < 3.0 * 0.06 / size:
             continue
         compared += 1
-        assert expected @ found / np.linalg.norm(expected) / np.linalg.norm(found) > 0.8, PARAMETERS[index]
-        assert 0.7 < expected @ found / (expected @ expected) < 1.3, PARAMETERS[index]
+        assert expected @ found / np.linalg.norm(expected) / np.linalg.norm(found) > 0.8, name
+        assert 0.7 < expected @ found / (expected @ expected) < 1.3, name
         hessian, _ = joint_equations(HAND, [view], state, motion)
         assert np.allclose(hessian[:26, :26], label_equations(HAND, [view], state), rtol=1e-3, atol=1e-2)
     assert compared >= 2
 
 
 def test_too_few_pictures_are_refused(tracker: HandTracker, pictures: list[list[np.ndarray]]):
-    with pytest.raises(BadInput, match="2 of 3 pictures show a hand"):
-        fitted_hand_shape(tracker, [*pictures[:2], [EMPTY, EMPTY]])
+    with pytest.raises(BadInput, match="2 pictures; the shape needs at least 20"):
+        fitted_hand_shape(tracker, pictures[:2])
+    with pytest.raises(BadInput, match="2 of 20 pictures show a hand"):
+        fitted_hand_shape(tracker, [*pictures[:2], *[[EMPTY, EMPTY]] * 18])
     with pytest.raises(Cancelled):
         fitted_hand_shape(tracker, pictures, cancelled=lambda: True)

@@ -112,6 +112,7 @@ def test_every_frame_is_tracked_and_what_is_broken_is_counted(
         np.nanmean(found.sd_deg[:, found.rotations.index("I_PIP")])
     )
     plain = estimates(film, "--out", tmp_path / "again.npz", "--stage", "blend")
+    assert said["shape"] == {"refused": "12 pictures; the shape needs at least 20, of different poses"}
     assert "12 frames tracked in" in plain.out
     assert "2 without a hand" in plain.out
     assert "mean SD of accepted, degrees" in plain.out

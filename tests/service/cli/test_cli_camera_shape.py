@@ -17,17 +17,20 @@ from cli_running import glovecal
 from other_gloves import other_hand
 
 from glovecal_client.pictures.label_file import LabelWriter
+from glovecal_models.colour_glove.hand_shape import TILTED, HandShape, read_shape, write_shape
 from glovecal_models.colour_glove.pattern import printed_pattern
 from glovecal_models.colour_glove.photograph import hand_motion
-from glovecal_models.colour_glove.pose.hand_shape_fit import ShapeOnFile, read_shape, write_shape
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import RADII_MM, hand_skin, posed
 from glovecal_models.errors import BadInput
+from glovecal_models.takes.camera_estimates import read_estimates
 from glovecal_service.camera.tracking_setup import ASSUMED
 
-KNOWN = ShapeOnFile(
-    "left", hand_skin().skeleton.dimensions.sizes_mm, dict(RADII_MM), 0.05, {"I_proximal": 0.02}
-)
+KNOWN = HandShape(
+    "left", hand_skin().skeleton.dimensions.sizes_mm, dict(RADII_MM),
+    dict.fromkeys(RADII_MM, (1.0, -2.0, 0.5, 0.0)), dict.fromkeys(TILTED, (1.5, -1.0)),
+    0.05, {"I_proximal": 0.02},
+)  # fmt: skip
 
 
 def test_a_shape_is_found_and_told_with_what_one_camera_leaves_open(tmp_path: Path) -> None:
@@ -52,6 +55,12 @@ def test_a_shape_is_found_and_told_with_what_one_camera_leaves_open(tmp_path: Pa
         sum((sizes[name] / true[name] - 1) ** 2 for name in bones) for sizes in (found.sizes_mm, assumed)
     )
     assert off < before
+    given, own = tmp_path / "given.npz", tmp_path / "own.npz"
+    with_it = glovecal(here, "camera", "estimates", *small, film, "--shape", shape, "--out", given)
+    by_itself = glovecal(here, "camera", "estimates", *small, film, "--out", own)
+    assert "The hand's shape was fitted to 22 frames" in by_itself.out, by_itself.said
+    assert "shape was fitted" not in with_it.out
+    assert read_estimates(own).angles_deg == pytest.approx(read_estimates(given).angles_deg, abs=0.01)
     refused = glovecal(
         here, "camera", "estimates", film, "--hand", "left", "--shape", shape, "--out", tmp_path / "no.npz"
     )
@@ -64,10 +73,17 @@ def test_a_shape_is_read_as_it_was_written_and_another_file_is_refused(tmp_path:
     write_shape(file, KNOWN)
     assert read_shape(file) == KNOWN
     document = json.loads(file.read_text())
+    earlier = {name: value for name, value in document.items() if name not in ("laid_mm", "tilts_deg")}
+    file.write_text(json.dumps(earlier | {"format": "glovecal hand shape 1"}))
+    alone = read_shape(file)
+    assert (alone.sizes_mm, alone.radii_mm) == (KNOWN.sizes_mm, KNOWN.radii_mm)
+    assert not any(any(row) for row in (*alone.laid_mm.values(), *alone.tilts_deg.values()))
     for change, said in (
         ({"hand": "both"}, "'both', expected right or left"),
         ({"sizes_mm": {"hand_length": 190.0}}, "sizes_mm must name"),
-        ({"radii_mm": {"T_distal": [1.0]}}, "two numbers"),
+        ({"radii_mm": {"T_distal": [1.0]}}, "radii_mm must hold 2 numbers"),
+        ({"laid_mm": document["laid_mm"] | {"T_distal": [1.0, 99.0, 0.0, 0.0]}}, "from -40 to 40"),
+        ({"tilts_deg": {"T_IP": [1.0, 1.0]}}, "tilts_deg must name"),
         ({"size_sd": float("nan")}, "holds the number NaN"),
         ({"format": "another"}, "is no hand's shape"),
         ({"more": 1}, "is no hand's shape"),

@@ -98,9 +98,11 @@ def joint_equations(
     for view in views:
         drawn = _Drawn(hand, view, placed, channels, _BLURS)
         both = [drawn.jacobian(state), drawn.jacobian(state, motion_mm)]
-        jacobian = np.concatenate(both, axis=1).astype(float) / SHARE_SD
+        jacobian = np.concatenate(both, axis=1) / np.float32(SHARE_SD)
+        moving = np.flatnonzero(jacobian.any(axis=1))  # few cells hold a boundary of a colour
+        jacobian = jacobian[moving].astype(float)
         hessian += jacobian.T @ jacobian
-        gradient += jacobian.T @ (drawn.apart.ravel() / SHARE_SD)
+        gradient += jacobian.T @ (drawn.apart.ravel()[moving] / SHARE_SD)
     return hessian, gradient
 
 

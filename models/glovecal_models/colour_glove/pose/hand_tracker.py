@@ -28,6 +28,7 @@ import numpy as np
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import ENTRIES, DatabaseSettings, pose_database
+from glovecal_models.colour_glove.hand_shape import HandShape
 from glovecal_models.colour_glove.hand_state import (
     DEGREES_OF_FREEDOM,
     FINGER_ROTATIONS,
@@ -147,7 +148,7 @@ _POSTERIOR_ALONE = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def fitted_scale(errors: np.ndarray, evidence: np.ndarray) -> np.ndarray:
-    """(26, 6): how evidence (N, 26, 6) counts, so that ``COVERED`` of ``errors`` (N, 26) lie within as many
+    """(D, 6): how evidence (N, D, 6) counts, so that ``COVERED`` of ``errors`` (N, D) lie within as many
     deviations as that share of a Gaussian's does. Raises BadInput for fewer frames than tell anything.
 
     The pinball loss of the errors' logarithms, smoothed (softplus), by quasi-Newton steps; it is convex.
@@ -165,8 +166,8 @@ def fitted_scale(errors: np.ndarray, evidence: np.ndarray) -> np.ndarray:
         scales = float(COVERED * above.sum() + _SMOOTH * less.sum() + 0.5 * _PULL * off @ off)
         return scales, -rows.T @ slope + _PULL * off
 
-    scales = np.empty((DEGREES_OF_FREEDOM, len(EVIDENCE)))
-    for column in range(DEGREES_OF_FREEDOM):
+    scales = np.empty((errors.shape[1], len(EVIDENCE)))
+    for column in range(errors.shape[1]):
         wanted = np.log(np.abs(errors[:, column]) / _WITHIN + 1e-3)
         rows = evidence[:, column]
         start = _POSTERIOR_ALONE + np.eye(len(EVIDENCE))[0] * np.quantile(wanted - rows[:, 1], COVERED)
@@ -409,27 +410,37 @@ def _in_first(state: HandState, camera: Camera) -> HandState:
 
 
 SHIPPED = Path(__file__).with_name("errors.npz")
-_ELSEWHERE = {1: 1.45, 2: 1.27}
+_ELSEWHERE = {(1, False): 1.45, (2, False): 1.27, (1, True): 1.45, (2, True): 1.1}
 """By how much hands that another program drew (tests/simulated/lit_glove.py, seeds 500 to 507) erred more
-than those that errors are learned on: RMS of accepted errors over their deviations, by cameras."""
+than those that errors are learned on: RMS of accepted errors over their deviations, by cameras, and whether
+the hand's shape was fitted."""
 _MIRRORED = np.array([1.0] * 20 + [1.0, -1.0, -1.0] + [-1.0, 1.0, 1.0])
 """Of a step, seen in a mirror beside the hand: turns about y and z, and the place along x, change signs."""
 
 
-def shipped_errors(cameras: int, hand: Handedness) -> LearnedErrors:
-    """Learned with one camera, or with two, which stand for more."""
+def shipped_errors(cameras: int, hand: Handedness, *, fitted: bool = False) -> LearnedErrors:
+    """Learned with one camera, or with two, which stand for more. ``fitted``: of hands whose shape was
+    fitted."""
     known = min(cameras, 2)
-    errors = LearnedErrors.load(SHIPPED, shipped_name(known))
-    larger = np.log(_ELSEWHERE[known]) * np.eye(len(EVIDENCE))[0]
+    errors = LearnedErrors.load(SHIPPED, shipped_name(known, fitted))
+    larger = np.log(_ELSEWHERE[known, fitted]) * np.eye(len(EVIDENCE))[0]
     errors = replace(errors, scales={name: scale + larger for name, scale in errors.scales.items()})
     if hand == "right":
         return errors
     return replace(errors, blend_covariance=errors.blend_covariance * np.outer(_MIRRORED, _MIRRORED))
 
 
-def shipped_name(cameras: int) -> str:
+def shipped_name(cameras: int, fitted: bool = False) -> str:
     """What arrays of the file begin with."""
-    return f"{cameras} camera{'s'[: cameras - 1]}: "
+    return f"{cameras} camera{'s'[: cameras - 1]}{', fitted' if fitted else ''}: "
+
+
+def with_shape(tracker: HandTracker, shape: HandShape) -> HandTracker:
+    """One that tracks the same hand in its fitted shape. The database stays that of the hand before: looking
+    up only begins."""
+    hand = PrintedHand(shape.skin(), tracker.hand.pattern)
+    errors = shipped_errors(len(tracker.cameras), shape.hand, fitted=True)
+    return HandTracker(hand, tracker.lookup, tracker.cameras, errors, stage=tracker.stage)
 
 
 def prepared_tracker(

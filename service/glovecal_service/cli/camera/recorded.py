@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from glovecal_models.errors import Cancelled
+from glovecal_models.errors import BadInput, Cancelled
 from glovecal_service.cli.camera.tracking_options import TrackingOptions, camera_extra
 from glovecal_service.cli.terminal.options import AsJson
 from glovecal_service.cli.terminal.printing import Refusal, err, out, print_json, print_table
@@ -23,11 +23,13 @@ from glovecal_service.cli.terminal.waiting import progress_bar
 from glovecal_service.operating_system import as_typed
 
 if TYPE_CHECKING:
+    from glovecal_models.colour_glove.pose.hand_shape_fit import FittedShape
     from glovecal_models.progress import Cancel
     from glovecal_service.camera.camera_settings import TrackingSettings
     from glovecal_service.camera.recorded_estimates import Recordings, TrackedRecordings
     from glovecal_service.camera.tracking_setup import TrackingSetup
 
+    _SetUp = tuple[TrackingSettings, Recordings, TrackingSetup, Cancel]
 
 ESTIMATES = ("a file of estimates", ".npz")
 SHAPE = ("a shape", ".json")
@@ -50,24 +52,60 @@ def estimates(
 ) -> None:
     """Track every frame of a recording and write what glovecal take camera makes a take's reference of.
 
-    Frames of two cameras are matched by their times; --calibration then holds both. Ctrl-C writes nothing.
+    The hand's shape in its glove is fitted to the recording first, unless --shape gives it. Frames of two
+    cameras are matched by their times; --calibration then holds both. Ctrl-C writes nothing.
     """
     with camera_extra():
         from glovecal_models.takes.camera_estimates import write_estimates
 
-    with _set_up(recordings, file, ESTIMATES, tracking, quiet=as_json) as (_, recorded, setup, cancelled):
+    told, said = dict[str, Any](), ""
+    with _set_up(recordings, file, ESTIMATES, tracking, quiet=as_json) as given:
+        settings, recorded, setup, cancelled = given
         if not setup.is_calibrated:
             err.print(
                 "The camera is not calibrated: focal length and distortion are assumed; "
                 "glovecal camera calibrate measures them."
             )
+        if settings.shape is None and settings.stage == "dense":
+            try:
+                fitted = _fitted(given, quiet=as_json)
+                setup = setup.fitted(fitted.shape)
+                told, said = _agreement(fitted), f"The hand's shape was fitted to {_agreed(fitted)}"
+            except BadInput as refused:
+                told = {"refused": str(refused)}
+                said = f"The hand's shape was not fitted, and stays as its sizes say: {refused}."
         with progress_bar(quiet=as_json) as report:
             found = recorded.tracked(setup, tracking.stage.value, report, cancelled)
         write_estimates(found.estimates, file)
     if as_json:
-        print_json(_document(found, file))
+        print_json({**_document(found, file), "shape": told})
     else:
+        if said:
+            out.print(said)
         _print(found, file)
+
+
+def _fitted(given: _SetUp, *, quiet: bool) -> FittedShape:
+    settings, recorded, setup, cancelled = given
+    with progress_bar(quiet=quiet) as report:
+        return recorded.fitted_shape(
+            setup, is_measured="hand_length" in settings.sizes_mm, report=report, cancelled=cancelled
+        )
+
+
+def _agreement(fitted: FittedShape) -> dict[str, Any]:
+    return {
+        "frames": len(fitted.used),
+        "disagreeing_before": fitted.disagreeing_before,
+        "disagreeing": fitted.disagreeing,
+    }
+
+
+def _agreed(fitted: FittedShape) -> str:
+    return (
+        f"{len(fitted.used)} frames; colours that disagree: {100 * fitted.disagreeing_before:.1f} % of the "
+        f"glove's pixels before, {100 * fitted.disagreeing:.1f} % with the shape."
+    )
 
 
 def _print(found: TrackedRecordings, file: Path) -> None:
@@ -157,7 +195,7 @@ def _document(found: TrackedRecordings, file: Path) -> dict[str, Any]:
 @contextmanager
 def _set_up(
     recordings: list[Path], file: Path, kind: tuple[str, str], tracking: TrackingOptions, *, quiet: bool
-) -> Iterator[tuple[TrackingSettings, Recordings, TrackingSetup, Cancel]]:
+) -> Iterator[_SetUp]:
     """What the recordings are tracked with. ``kind``: what ``file`` is to be, and how its name ends.
 
     Raises Refusal for a file that cannot be written, and once Ctrl-C has stopped it.
@@ -227,34 +265,15 @@ def shape(
     two calibrated cameras.
     """
     with camera_extra():
-        from glovecal_models.colour_glove.pose.hand_shape_fit import (
-            MEASURED_SIZE_SD,
-            SIZE_SD,
-            ShapeOnFile,
-            fitted_hand_shape,
-            write_shape,
-        )
+        from glovecal_models.colour_glove.hand_shape import write_shape
 
-    with (
-        _set_up(recordings, file, SHAPE, tracking, quiet=as_json) as (settings, recorded, setup, cancelled),
-        progress_bar(quiet=as_json) as report,
-    ):
-        found = fitted_hand_shape(
-            setup.first, recorded.spread_labels(setup),
-            size_sd=MEASURED_SIZE_SD if "hand_length" in settings.sizes_mm else SIZE_SD,
-            report=report, cancelled=cancelled,
-        )  # fmt: skip
-    kept = ShapeOnFile(
-        setup.hand.skin.skeleton.hand, found.sizes_mm, found.radii_mm, found.size_sd, found.bones_sd
-    )
-    write_shape(file, kept)
+    with _set_up(recordings, file, SHAPE, tracking, quiet=as_json) as given:
+        recorded, setup = given[1:3]
+        fitted = _fitted(given, quiet=as_json)
+    found = fitted.shape
+    write_shape(file, found)
     if as_json:
-        print_json(
-            {
-                "file": str(file), "frames": len(found.used), "disagreeing_before": found.disagreeing_before,
-                "disagreeing": found.disagreeing, **vars(kept),
-            }
-        )  # fmt: skip
+        print_json({"file": str(file), **_agreement(fitted), **vars(found)})
         return
     before = setup.hand.skin.skeleton.dimensions.sizes_mm
     rows = [
@@ -268,10 +287,7 @@ def shape(
     ]
     heads = {"length": "length", "before": "before, mm", "found": "found, mm", "sd": "standard deviation, mm"}
     print_table(rows, heads, empty="")
-    out.print(
-        f"{len(found.used)} frames; colours that disagree: {100 * found.disagreeing_before:.1f} % of the "
-        f"glove's pixels before, {100 * found.disagreeing:.1f} % with the shape."
-    )
+    out.print(_agreed(fitted))
     if len(recorded.sources) == 1:
         out.print(
             f"One camera leaves the size open by {100 * found.size_sd:.0f} %: distances from the camera are "
