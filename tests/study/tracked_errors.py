@@ -193,8 +193,8 @@ def report(
         work_off(partial(tracked, study), range(hands), os.cpu_count() or 1, found.__setitem__, "tracking")
         those = [hand for _, hand in sorted(found.items())]
         refused = sum(hand.bones is None for hand in those)
-        said = f"{refused} of {hands} shapes were refused. " if fits_shape else ""
-        text += f"\n## {name}\n\n{said}{table(those)}\n"
+        refusals = f"{refused} of {hands} shapes were refused. " if fits_shape else ""
+        text += f"\n## {name}\n\n{refusals}{table(those)}\n"
     return text
 
 

@@ -68,8 +68,8 @@ def tilted(right: Skeleton, tilts_deg: Mapping[str, Sequence[float]]) -> Skeleto
             first = np.eye(3)[np.argmin(np.abs(axis))]
             first = first - (first @ axis) * axis
             first /= np.linalg.norm(first)
-            aside, beside = np.tan(np.radians(tilts_deg[joint.name]))
-            axis = axis + aside * first + beside * np.cross(axis, first)
+            by_first, by_second = np.tan(np.radians(tilts_deg[joint.name]))
+            axis = axis + by_first * first + by_second * np.cross(axis, first)
             x, y, z = (axis / np.linalg.norm(axis)).tolist()
             joint = replace(joint, axis=(x, y, z))
         joints.append(joint)

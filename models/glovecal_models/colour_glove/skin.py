@@ -382,13 +382,13 @@ def _stretched(template: _Template, bones: tuple[_Bone, ...], laid_mm: np.ndarra
     carried = np.empty((len(bones), 3, 4))
     for column, (old, new) in enumerate(zip(template.bones, bones, strict=True)):
         thicker = sum(new.radii_mm) / sum(old.radii_mm)
-        along, around, *beside = laid_mm[column]
+        along, around, *across_above = laid_mm[column]
         angle = around / (0.5 * sum(new.radii_mm))
         sine, cosine = np.sin(angle), np.cos(angle)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
         scaled = np.diag([new.length_mm / old.length_mm, thicker, thicker]) @ old.frame.T
         whole = new.frame @ turn @ scaled
         carried[column, :, :3] = whole
-        carried[column, :, 3] = new.start_mm + new.frame @ (along, *beside) - whole @ old.start_mm
+        carried[column, :, 3] = new.start_mm + new.frame @ (along, *across_above) - whole @ old.start_mm
     blended = (template.bone_weights @ carried.reshape(len(bones), 12)).reshape(-1, 3, 4)
     return np.einsum("vab,vb->va", blended[:, :, :3], template.vertices_mm) + blended[:, :, 3]

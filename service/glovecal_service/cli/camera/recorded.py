@@ -58,7 +58,7 @@ def estimates(
     with camera_extra():
         from glovecal_models.takes.camera_estimates import write_estimates
 
-    told, said = dict[str, Any](), ""
+    fit, sentence = dict[str, Any](), ""
     with _set_up(recordings, file, ESTIMATES, tracking, quiet=as_json) as given:
         settings, recorded, setup, cancelled = given
         if not setup.is_calibrated:
@@ -70,18 +70,18 @@ def estimates(
             try:
                 fitted = _fitted(given, quiet=as_json)
                 setup = setup.fitted(fitted.shape)
-                told, said = _agreement(fitted), f"The hand's shape was fitted to {_agreed(fitted)}"
+                fit, sentence = _agreement(fitted), f"The hand's shape was fitted to {_agreed(fitted)}"
             except BadInput as refused:
-                told = {"refused": str(refused)}
-                said = f"The hand's shape was not fitted, and stays as its sizes say: {refused}."
+                fit = {"refused": str(refused)}
+                sentence = f"The hand's shape was not fitted, and stays as its sizes say: {refused}."
         with progress_bar(quiet=as_json) as report:
             found = recorded.tracked(setup, tracking.stage.value, report, cancelled)
         write_estimates(found.estimates, file)
     if as_json:
-        print_json({**_document(found, file), "shape": told})
+        print_json({**_document(found, file), "shape": fit})
     else:
-        if said:
-            out.print(said)
+        if sentence:
+            out.print(sentence)
         _print(found, file)
 
 
