@@ -21,6 +21,7 @@ from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
 from glovecal_models.colour_glove.skin import hand_skin, posed
 from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.hand.skeleton import hand_skeleton, mirrored
 
 SKIN = hand_skin()
 HAND = PrintedHand(SKIN, glove_pattern(SKIN))
@@ -117,6 +118,29 @@ def test_skins_of_another_shape_move_as_the_equations_say():
         hessian, _ = joint_equations(HAND, [view], state, motion)
         assert np.allclose(hessian[:26, :26], label_equations(HAND, [view], state), rtol=1e-3, atol=1e-2)
     assert compared >= 2
+
+
+def test_a_left_hand_of_a_shape_is_the_right_one_in_a_mirror() -> None:
+    values = np.random.default_rng(7).normal(size=len(PARAMETERS)) * 0.5 * np.sqrt(_prior_variance())
+    right, left = (shaped(hand_skin(hand_skeleton(hand=side)), values) for side in ("right", "left"))
+    assert np.allclose(left.vertices_mm, right.vertices_mm * (1.0, -1.0, 1.0))
+    assert left.skeleton == mirrored(right.skeleton)
+    assert mirrored(left.skeleton) == right.skeleton
+    plain = shaped(SKIN, np.zeros(len(PARAMETERS)))
+    assert np.allclose(plain.vertices_mm, SKIN.vertices_mm)
+    assert not np.allclose(right.vertices_mm, SKIN.vertices_mm, atol=0.5)
+    with pytest.raises(BadInput, match="4 finite numbers"):
+        hand_skin(laid_mm={"I_distal": (1.0, float("nan"), 0.0, 0.0)})
+
+
+def _prior_variance() -> np.ndarray:
+    """Of hands about the model's, in the order of ``PARAMETERS``."""
+    return np.array(
+        [
+            4.0 if "axis" in name else 9.0 if name.endswith(("along", "around", "across", "above")) else 2e-3
+            for name in PARAMETERS
+        ]
+    )
 
 
 def test_too_few_pictures_are_refused(tracker: HandTracker, pictures: list[list[np.ndarray]]):

@@ -9,6 +9,7 @@ from other_gloves import displaced, other_hand
 
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import PoseDatabase
+from glovecal_models.colour_glove.hand_shape import HandShape
 from glovecal_models.colour_glove.hand_state import STAGES
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
 from glovecal_models.colour_glove.pattern import glove_pattern
@@ -21,11 +22,13 @@ from glovecal_models.colour_glove.pose.hand_tracker import (
     fitted_scale,
     scale_name,
     shipped_errors,
+    with_shape,
 )
 from glovecal_models.colour_glove.pose.window_view import PrintedHand
 from glovecal_models.colour_glove.rasterise import rasterise
-from glovecal_models.colour_glove.skin import HandSkin, hand_skin, posed
+from glovecal_models.colour_glove.skin import RADII_MM, HandSkin, hand_skin, posed
 from glovecal_models.errors import BadInput, Cancelled
+from glovecal_models.hand.skeleton import hand_skeleton
 
 SKIN = hand_skin()
 HAND = PrintedHand(SKIN, glove_pattern(SKIN))
@@ -193,6 +196,26 @@ def test_what_was_learned_comes_with_the_package(cameras: int) -> None:
     assert np.array_equal(np.diag(left.blend_covariance), np.diag(right.blend_covariance))
     mirrored = left.blend_covariance[:20, 21]
     assert np.array_equal(mirrored, -right.blend_covariance[:20, 21])
+
+
+def test_less_is_stated_of_a_hand_whose_shape_was_fitted(lookup) -> None:
+    """By two cameras, where as much disagrees; both hands."""
+    evidence = np.ones((26, len(EVIDENCE)))
+    evidence[:, 1:] = np.log([2.0, 0.2, 0.3, 3.0, 15.0])
+    for side in ("right", "left"):
+        skin = hand_skin(hand_skeleton(hand=side))
+        before = HandTracker(PrintedHand(skin, HAND.pattern), lookup, CAMERAS, shipped_errors(2, side))
+        shape = fitted_shape_of(skin)
+        after = with_shape(before, shape)
+        assert np.allclose(after.hand.skin.vertices_mm, skin.vertices_mm)
+        assert after.lookup is before.lookup
+        stated = [each.errors.deviation("dense", True, evidence)[:20] for each in (before, after)]
+        assert stated[1].mean() < 0.8 * stated[0].mean()
+
+
+def fitted_shape_of(skin: HandSkin) -> HandShape:
+    """That of the skin itself."""
+    return HandShape(skin.skeleton.hand, skin.skeleton.dimensions.sizes_mm, dict(RADII_MM), {}, {}, 0.02, {})
 
 
 def test_a_scale_is_found_again() -> None:
