@@ -228,7 +228,8 @@ def _to_record(job: str, found: MissingEffects) -> None:
         heading(2, "What to record next")
         if plan is not None:
             ui.label(plan.heading)
-            _listed(plan.sentences)
+            _listed([step.sentence for step in plan.steps], "ol")
+            ui.label(plan.columns_sentence)
             ui.button(
                 "Record it" if len(plan.each_take) == 1 else "Record them",
                 on_click=lambda: ui.navigate.to(f"/capture?proposal={job}"),
@@ -274,7 +275,7 @@ def _learned(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield words.replace("_", " ") or name, f"{low if low == high else f'{low} to {high}'} {unit}"
 
 
-def _listed(sentences: Sequence[str]) -> None:
-    with ui.element("ul").classes("reasons"):
+def _listed(sentences: Sequence[str], tag: str = "ul") -> None:
+    with ui.element(tag).classes("reasons"):
         for sentence in sentences:
             TextElement(tag="li", text=sentence)
