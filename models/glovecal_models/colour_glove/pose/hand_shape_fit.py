@@ -128,7 +128,8 @@ def fitted_hand_shape(
     if len(frames) < FEWEST_PICTURES:
         raise BadInput(
             f"{len(frames)} of {len(chosen)} pictures show a hand whose pose is understood; the shape needs "
-            f"at least {FEWEST_PICTURES}, of different poses, the whole glove in view"
+            f"at least {FEWEST_PICTURES}, of different poses, the whole glove in view and nothing else in "
+            "its colours, on the arm or behind the hand"
         )
     lengths = [size_sd] + [BONES_SD] * len(_BONES) + [RADII_SD] * len(RADII_MM)
     prior = (
