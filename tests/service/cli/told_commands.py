@@ -20,7 +20,7 @@ END = re.compile(r"[\n`\";,()]| \| |   |\.(?= |$)|[.?]$|'s\b|: |:$")
 ADVICE = re.compile(r"(?:[:.] |: `|\n +)$")
 """A command that follows is to be typed: it is whole, and no part of the sentence."""
 ARGUMENT = re.compile(r" --|[0-9A-Z]")
-FORMATS = ("glovecal hand shape 1", "glovecal cameras 1")
+FORMATS = ("glovecal hand shape 1", "glovecal hand shape 2", "glovecal cameras 1")
 """First lines of files of ours, which are no commands."""
 SAMPLES = {
     "model": "0123456789ab", "short": "0123456789ab", "last": "0123456789ab", "newest": "0123456789ab",
