@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from blind_glove import BlindGlove, Nuisance
-from simulated_camera import SimulatedCamera, lasting_noise
+from simulated_camera import ON_OTHER_HANDS, SimulatedCamera, lasting_noise
 
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
@@ -26,7 +26,7 @@ from glovecal_models.takes.camera_estimates import CameraEstimates, covered_rang
 from glovecal_models.takes.camera_reference import camera_clock, reference_from_camera
 from glovecal_models.takes.take import Take
 
-MEASURED = SimulatedCamera()
+MEASURED = ON_OTHER_HANDS
 TRUE_SIZE, CAMERA_SIZE = 1.3, 2.6
 """Strength of the hidden effect in noise floors: of the glove's usual reference, and twice that."""
 NUISANCES: tuple[Nuisance, ...] = ("drift", "white", "posture")

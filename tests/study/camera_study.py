@@ -1,8 +1,8 @@
 """``python3 do.py study camera``: is a camera as good a reference as true angles?
 
-Gloves and camera are simulated; no picture is made. What the camera's errors are like was measured on
-rendered pictures (``simulation/simulated_camera.py``). Clock offsets, the error of a calibration in a second
-wearing, hidden effects judged by the camera, clean gloves.
+Gloves and camera are simulated; no picture is made. What the camera's errors are like was measured on hands
+that another program draws (``tests/simulated/simulated_camera.py``). Clock offsets, the error of a
+calibration in a second wearing, hidden effects judged by the camera, clean gloves.
 """
 
 from __future__ import annotations
