@@ -24,10 +24,11 @@ class LackOfMotion(str):
     """Why takes cannot show an effect, where a take of ``motion`` could."""
 
     __slots__ = ("motion",)
+    motion: Motion
 
     def __new__(cls, why: str, motion: Motion) -> LackOfMotion:
         lacks = super().__new__(cls, why)
-        lacks.motion: Motion = motion
+        lacks.motion = motion
         return lacks
 
 
