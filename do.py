@@ -27,7 +27,8 @@
                             study told: what doctor, live watch, training and pages tell of healthy gloves
                             (ten minutes; --gloves N, --method lmc_gpr);
                             study demos: is anything told in fifty demos that is not so? (half an hour);
-                            study camera: a camera as the reference against true angles (half an hour);
+                            study camera: a camera as the reference against true angles
+                            (a quarter of an hour);
                             study camera-errors: what the colour glove's tracker errs by (an hour);
                             study faults: kills, cuts, full disks at random: is anything lost? (two minutes;
                             --faults N, --seed S, --minutes N; --table lists what is tried)
