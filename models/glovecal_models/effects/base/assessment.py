@@ -58,10 +58,15 @@ class JointErrors:
         takes = np.unique(self.take)
         if len(takes) < 3:
             return self.contrast
-        saved = [self.beyond_control[self.take == take].sum() for take in takes]
+        saved = self.saved_in_takes
         rest = self.take != takes[int(np.argmax(saved))]
         base = self.base[rest]
         return saved_share(base, self.added[rest]) - max(saved_share(base, self.control[rest]), 0.0)
+
+    @property
+    def saved_in_takes(self) -> np.ndarray:
+        """(T,): ``beyond_control``, summed over the blocks of each take."""
+        return np.array([self.beyond_control[self.take == take].sum() for take in np.unique(self.take)])
 
     @property
     def beyond_control(self) -> np.ndarray:
@@ -150,13 +155,22 @@ class Assessment:
         if self.p_value is not None:
             return self._significant_in_session(self.p_value)
         joint_p_value = self.limits.joint_p_value / max(1, len(self.errors) / 5)
-        some = {i for i, item in enumerate(self.errors) if self._is_beyond_chance(item, joint_p_value)}
+        some = {i for i, item in enumerate(self.errors) if self._is_alone_beyond_chance(item, joint_p_value)}
         together = [i for i, item in enumerate(self.errors) if item.contrast >= 0.5 * self.limits.least_share]
         if len(together) > 1 and self._is_beyond_chance(
             pooled_errors(self.errors), self.limits.pooled_p_value
         ):
             some.update(together)
         return tuple(sorted(some))
+
+    def _is_alone_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
+        """Whether one joint shows it without the others: in its takes too, the blocks of one go together."""
+        limits, takes = self.limits, errors.saved_in_takes
+        if errors.contrast < limits.alone_share:
+            return False
+        is_faint = len(takes) >= limits.few_takes and errors.contrast < limits.clear_share
+        in_takes = signed_rank(takes) if is_faint else 0.0
+        return in_takes <= limits.alone_takes_p_value and self._is_beyond_chance(errors, p_value)
 
     def _is_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
         limits = self.limits
@@ -176,10 +190,13 @@ class Assessment:
         return is_large and random_signs(errors.beyond_control, self.limits.fewest_blocks) <= p_value
 
     def _significant_in_session(self, p_value: float) -> tuple[int, ...]:
+        limits = self.limits
         largest = max((item.contrast for item in self.errors), default=0.0)
+        is_alone = largest < limits.alone_clear_share and self._contrast_of_all < limits.together_share
         # what a model's effects leave of themselves in a few takes may go along with a wearing by chance
-        is_clear = largest >= self.limits.clear_share and not any(self.known_saved_square)
+        is_clear = largest >= limits.clear_share and not is_alone and not any(self.known_saved_square)
         most = self.certainty.clear if is_clear else self.certainty.faint
+        most = min(most, limits.alone_session_p_value) if is_alone else most
         if p_value > (min(most, self.certainty.of_few_takes) if self._has_few_takes else most):
             return ()
         least = self.limits.least_session_share
@@ -190,6 +207,10 @@ class Assessment:
         if max(several, default=0.0) < self.limits.few_takes_large_share:
             return ()
         return tuple(i for i in some if several[i] >= 0.5 * least)
+
+    @property
+    def _contrast_of_all(self) -> float:
+        return pooled_errors(self.errors).contrast if self.errors else 0.0
 
     @cached_property
     def _has_few_takes(self) -> bool:

@@ -41,6 +41,7 @@ from glovecal_models.effects.garment_slip.slip_components import (
     SlipComponents,
     likelier_with_cause,
     slip_components,
+    slipping,
 )
 from glovecal_models.effects.garment_slip.slip_rate import frame_noise, slip_rate, without_posture
 from glovecal_models.takes.take import Take
@@ -113,17 +114,17 @@ class GarmentSlip(IntervalEffect, Hidden):
         check_signature_input(takes, sensor_of, errors)
         if errors is None:
             return ()
+        times, rotations = [take.time_s for take in takes], list(sensor_of)
+        owns = [[error[:, column] for error in errors] for column in range(len(rotations))]
+        angles = [[take.reference_at_frames([name])[:, 0] for take in takes] for name in rotations]
+        plains = [without_posture(own, angle) for own, angle in zip(owns, angles, strict=True)]
+        slips = [slip_components(takes, plain, angle) for plain, angle in zip(plains, angles, strict=True)]
         found: list[tuple[Finding, list[np.ndarray]]] = []
-        times = [take.time_s for take in takes]
-        for column, rotation in enumerate(sensor_of):
-            own = [error[:, column] for error in errors]
-            angles = [take.reference_at_frames([rotation])[:, 0] for take in takes]
-            plain = without_posture(own, angles)
-            slip = slip_components(takes, plain, angles)
-            if slip is None or not slip.is_slip(len(sensor_of)):
-                continue
-            if slip.size_deg > OVER_NOISE * frame_noise(plain, times):
-                found.append((_finding(rotation, slip, slip_rate(times, own, angles)), plain))
+        for column in slipping(slips):
+            slip, plain = slips[column], plains[column]
+            if slip is not None and slip.size_deg > OVER_NOISE * frame_noise(plain, times):
+                rate = slip_rate(times, owns[column], angles[column])
+                found.append((_finding(rotations[column], slip, rate), plain))
         between = [plain for finding, plain in found if finding.kind == BETWEEN]
         if is_common(takes, between):
             found = [(finding, plain) for finding, plain in found if finding.kind != BETWEEN]

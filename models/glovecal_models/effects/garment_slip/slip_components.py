@@ -23,10 +23,17 @@ from glovecal_models.takes.take import Take
 
 EVERY_GLOVE_DEG = 0.25
 """Of each component; a healthy glove's own wandering comes back, and is a component of its own."""
-LIKELIER, FEW_JOINTS = 4.0, 5
-"""Twice the log likelihood ratio from which on it is a slip; more with more joints, each a chance to err. Of
-80 simulated clean gloves of five and six joints none reaches 3, of 36 that slip by 1.3 noise floors 32 reach
-4; a clean session of six minutes reached 3.5."""
+LIKELIER, FEW_JOINTS = 8.0, 5
+"""Twice the log likelihood ratio, of one joint or summed over all, from which on it is a slip. Of 100
+simulated clean gloves of five joints that wander by 0.4 degrees one reaches 8, of 60 others none;
+of 36 that slip by 0.65 noise floors 24, of 30 by 1.3 all (2026-11-28). With 4 on one joint, as it was before,
+every tenth that wanders had a slip."""
+EACH_LIKELIER = 0.7
+"""So much more of the sum for each joint beyond the few: three times the mean of clean gloves."""
+SOME_LIKELIER = 2.0
+"""Where the sum is a slip's, the joints of this ratio slip."""
+ALIKE_LIKELIER = 1.0
+"""Below, it is as of every glove."""
 LEAST_SLOW_DEG = 0.35
 """Means that scatter by less hold no slip that is worth a name."""
 FEWEST_SLOW_PIECES = 18
@@ -61,16 +68,23 @@ class SlipComponents:
     """The same ratio for offsets and gains of the wearings beside the slip."""
     pieces: int
 
-    def is_slip(self, joints: int) -> bool:
-        """One of so many joints that were looked at."""
-        return self.likelier > LIKELIER + 2 * np.log(max(joints / FEW_JOINTS, 1.0))
+
+def slipping(slips: Sequence[SlipComponents | None]) -> tuple[int, ...]:
+    """Which of all joints that were looked at slip: by what they show together, or each alone."""
+    likelier = np.array([0.0 if slip is None else slip.likelier for slip in slips])
+    further = max(len(slips) - FEW_JOINTS, 0)
+    if likelier.sum() > LIKELIER + EACH_LIKELIER * further:
+        return tuple(map(int, np.flatnonzero(likelier > SOME_LIKELIER)))
+    alone = LIKELIER + 2 * np.log1p(further / FEW_JOINTS)
+    return tuple(map(int, np.flatnonzero(likelier > alone)))
 
 
 def slip_components(
     takes: Sequence[Take], errors: Sequence[np.ndarray], angles: Sequence[np.ndarray]
 ) -> SlipComponents | None:
     """``errors`` (N,) of each take less what goes with posture, ``angles`` (N,) measured, degrees; NaN where
-    there is no reference. None where there is too little to say, or no slow error worth a name."""
+    there is no reference. None where there is too little to say, no slow error worth a name, or no more of a
+    slip than every glove has."""
     pieces = slip_pieces(takes, errors, angles)
     if len(pieces.error) < FEWEST_SLOW_PIECES or pieces.error.std() < LEAST_SLOW_DEG:
         return None
@@ -81,7 +95,7 @@ def slip_components(
     slips = _slip_names(parts)
     held, start = likelihood.highest({name: most if name in slips else MOST_LOG for name in parts})
     free, logs = likelihood.highest(dict.fromkeys(parts, MOST_LOG), start)
-    if 2 * (free - held) <= LIKELIER:
+    if 2 * (free - held) <= ALIKE_LIKELIER:
         return None
     variance = {name: spread**2 * float(np.exp(log)) for name, log in logs.items()}
     sizes = {kind: sum(variance[name] for name in _slip_names(parts) if name[0] == kind) for kind in SLIPS}
