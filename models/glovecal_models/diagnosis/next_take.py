@@ -146,7 +146,7 @@ def too_few(
     takes: Sequence[Signals], faint: Sequence[Assessment], limits: DiagnosisLimits
 ) -> list[NotIdentifiable]:
     """What would be named if so much of it were seen in many takes, and the takes to record."""
-    more = max(limits.few_takes - len(takes), 1)
+    more = max(limits.few_takes - len(takes), -(-len(takes) // 3))
     more_takes = _more(more)
     why = f"{len(takes)} takes are too few to tell what may be saved from chance: record {more_takes}"
     what = f"Record {more_takes} in free motion."

@@ -26,7 +26,7 @@ from glovecal_models.colour_glove.pose.dense import joint_equations, refine_by_l
 from glovecal_models.colour_glove.pose.hand_tracker import HandTracker
 from glovecal_models.colour_glove.pose.window_step import Belief
 from glovecal_models.colour_glove.pose.window_view import PrintedHand, WindowView
-from glovecal_models.colour_glove.skin import LAID, RADII_MM, HandSkin, hand_skin, posed
+from glovecal_models.colour_glove.skin import ASSUMED_LENGTH_MM, LAID, RADII_MM, HandSkin, posed
 from glovecal_models.errors import BadInput
 from glovecal_models.hand.dimensions import DIMENSIONS
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -238,8 +238,7 @@ def _shape(skin: HandSkin, values: np.ndarray) -> HandShape:
     grown, sizes = by_name["size"], {}
     for name, size in skin.skeleton.dimensions.sizes_mm.items():
         sizes[name] = size * grown * (1.0 if name in _WHOLE else by_name[name])
-    assumed = hand_skin().skeleton.dimensions.hand_length_mm
-    share = grown * skin.skeleton.dimensions.hand_length_mm / assumed
+    share = grown * skin.skeleton.dimensions.hand_length_mm / ASSUMED_LENGTH_MM
     radii = {
         name: (low * share * by_name[f"{name} radius"], high * share * by_name[f"{name} radius"])
         for name, (low, high) in RADII_MM.items()
@@ -251,19 +250,19 @@ def _shape(skin: HandSkin, values: np.ndarray) -> HandShape:
     return HandShape(skin.skeleton.hand, sizes, radii, laid, tilts, 0.0, {})
 
 
-def _beside(skin: HandSkin, values: np.ndarray) -> list[tuple[HandSkin, HandSkin]]:
-    """For each parameter a hand with less and one with more of it."""
-    steps = np.diag(_STEP)
-    return [(shaped(skin, values - step), shaped(skin, values + step)) for step in steps]
+def _beside(skin: HandSkin, values: np.ndarray) -> list[HandSkin]:
+    """For each parameter a hand with a step more of it."""
+    return [shaped(skin, values + step) for step in np.diag(_STEP)]
 
 
 def _about_shape(
-    hand: PrintedHand, frame: _Frame, beside: Sequence[tuple[HandSkin, HandSkin]]
+    hand: PrintedHand, frame: _Frame, beside: Sequence[HandSkin]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information (P, P) and gradient (P,) of one picture about the shape, its pose eliminated."""
-    motion = np.empty((len(hand.skin.vertices_mm), 3, len(PARAMETERS)))
-    for index, (less, more) in enumerate(beside):
-        motion[:, :, index] = (posed(more, frame.state) - posed(less, frame.state)) / (2 * _STEP[index])
+    placed = posed(hand.skin, frame.state)
+    motion = np.empty((*placed.shape, len(PARAMETERS)))
+    for index, more in enumerate(beside):
+        motion[:, :, index] = (posed(more, frame.state) - placed) / _STEP[index]
     hessian, gradient = joint_equations(hand, frame.views, frame.state, motion)
     # Of the look-up only angles count: its depths take the hand for the database's size, all alike.
     for belief in frame.beliefs:

@@ -219,8 +219,14 @@ class Assessment:
 
     @property
     def as_of_many_takes(self) -> Assessment:
-        """The same, judged as where there are many takes."""
-        return replace(self, certainty=replace(self.certainty, of_few_takes=1.0))
+        """The same, judged as where there are many takes: also what one joint alone shows."""
+        limits = replace(
+            self.limits,
+            alone_share=self.limits.least_share,
+            alone_takes_p_value=1.0,
+            alone_clear_share=0.0,
+        )
+        return replace(self, certainty=replace(self.certainty, of_few_takes=1.0), limits=limits)
 
     @property
     def saved_square(self) -> float:

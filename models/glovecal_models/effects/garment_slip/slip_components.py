@@ -23,15 +23,16 @@ from glovecal_models.takes.take import Take
 
 EVERY_GLOVE_DEG = 0.25
 """Of each component; a healthy glove's own wandering comes back, and is a component of its own."""
-LIKELIER, FEW_JOINTS = 8.0, 5
-"""Twice the log likelihood ratio, of one joint or summed over all, from which on it is a slip. Of 100
-simulated clean gloves of five joints that wander by 0.4 degrees one reaches 8, of 60 others none;
-of 36 that slip by 0.65 noise floors 24, of 30 by 1.3 all (2026-11-28). With 4 on one joint, as it was before,
-every tenth that wanders had a slip."""
-EACH_LIKELIER = 0.7
-"""So much more of the sum for each joint beyond the few: three times the mean of clean gloves."""
-SOME_LIKELIER = 2.0
-"""Where the sum is a slip's, the joints of this ratio slip."""
+LIKELIER, FEW_JOINTS = 4.0, 5
+"""Twice the log likelihood ratio from which on one joint alone slips; more with more joints, each a chance to
+err."""
+LARGE_DEG = 0.55
+"""And at least one joint has to slip by more: of 310 simulated clean gloves that wander by 0.4 degrees eleven
+have a ratio above 4, up to 14, all of 0.54 degrees at most; of 14 that slip by 0.65 noise floors and are that
+likely twelve slip by more, of twelve that slip by 1.3 eleven (2026-11-28)."""
+TOGETHER_LIKELIER, EACH_LIKELIER, SOME_LIKELIER = 8.0, 0.7, 2.0
+"""Joints of the last ratio slip where the ratios of all joints, few or fewer, add up to the first; to more by
+the second for each further joint, three times the mean of clean gloves."""
 ALIKE_LIKELIER = 1.0
 """Below, it is as of every glove."""
 LEAST_SLOW_DEG = 0.35
@@ -72,11 +73,13 @@ class SlipComponents:
 def slipping(slips: Sequence[SlipComponents | None]) -> tuple[int, ...]:
     """Which of all joints that were looked at slip: by what they show together, or each alone."""
     likelier = np.array([0.0 if slip is None else slip.likelier for slip in slips])
+    is_large = np.array([slip is not None and slip.size_deg > LARGE_DEG for slip in slips])
     further = max(len(slips) - FEW_JOINTS, 0)
-    if likelier.sum() > LIKELIER + EACH_LIKELIER * further:
-        return tuple(map(int, np.flatnonzero(likelier > SOME_LIKELIER)))
-    alone = LIKELIER + 2 * np.log1p(further / FEW_JOINTS)
-    return tuple(map(int, np.flatnonzero(likelier > alone)))
+    some = likelier > SOME_LIKELIER
+    if likelier.sum() > TOGETHER_LIKELIER + EACH_LIKELIER * further and np.any(some & is_large):
+        return tuple(map(int, np.flatnonzero(some)))
+    alone = likelier > LIKELIER + 2 * np.log1p(further / FEW_JOINTS)
+    return tuple(map(int, np.flatnonzero(alone & is_large)))
 
 
 def slip_components(
