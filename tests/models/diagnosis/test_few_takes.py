@@ -1,4 +1,5 @@
-"""Few takes need more certainty: blocks of one take go together, and one take may be unlike all others."""
+"""Few takes need more certainty: blocks of one take go together, and one take may be unlike all others. So
+does what one joint of many shows: each is a chance to err."""
 
 from __future__ import annotations
 
@@ -69,6 +70,46 @@ def test_a_column_that_goes_along_with_few_takes_is_chance_more_often():
     alone = np.zeros((6, BLOCKS_OF_A_TAKE))
     alone[2] = 0.9
     assert not assessed(6, alone, between[0]).significant_joints
+
+
+def one_of_five(share: float, p_value: float | None = None, others: float = 0.0) -> Assessment:
+    """Of 12 takes; the four other joints are saved another share."""
+    [mine], [other] = (assessed(12, mostly(each, 12)).errors for each in (share, others))
+    return replace(
+        assessed(12, mostly(share, 12), p_value),
+        joints=("I_PIP", "M_PIP", "R_PIP", "P_PIP", "T_IP"),
+        errors=(mine, *[other] * 4),
+    )
+
+
+def test_what_one_joint_alone_shows_is_undecided_before_it_is_named():
+    for found, is_named in (
+        (one_of_five(0.06), False),
+        (one_of_five(0.06, others=0.06), True),
+        (one_of_five(0.15), True),
+        (one_of_five(0.3, p_value=0.01), False),
+        (one_of_five(0.3, p_value=0.01, others=0.2), True),
+        (one_of_five(0.3, p_value=0.003), True),
+        (one_of_five(0.55, p_value=0.01), True),
+    ):
+        assert bool(found.significant_joints) is is_named
+        assert found.as_of_many_takes.significant_joints
+
+
+def test_one_joint_is_named_where_its_takes_say_so_too():
+    in_two_takes = mostly(-0.01, 12)
+    in_two_takes[::3] = 0.4
+    found = assessed(12, in_two_takes)
+    assert 0.08 < found.errors[0].contrast < 0.25
+    assert not found.significant_joints
+    assert assessed(12, mostly(found.errors[0].contrast, 12)).significant_joints
+
+
+@pytest.mark.parametrize(("seed", "nuisance"), [(5085, "white"), (5117, "drift"), (70003, "drift")])
+def test_a_healthy_glove_that_one_joint_spoke_against_has_nothing_named(seed, nuisance):
+    """Each had hysteresis, warmup_drift, donning_shift named before (2026-11-28)."""
+    takes = record_session(SessionPlan(seed=seed, rate_hz=100.0, nuisance=nuisance)).takes
+    assert diagnose(takes, LAYOUT, judge_residual=False).named is None
 
 
 def test_what_few_takes_show_faintly_asks_for_more_takes():

@@ -17,7 +17,12 @@ from glovecal_models.effects.garment_slip.garment_slip import (
     SlipInterval,
     slip_growth,
 )
-from glovecal_models.effects.garment_slip.slip_components import slip_pieces
+from glovecal_models.effects.garment_slip.slip_components import (
+    INSIDE,
+    SlipComponents,
+    slip_pieces,
+)
+from glovecal_models.effects.garment_slip.slip_components import slipping as joints_that_slip
 from glovecal_models.effects.garment_slip.slip_rate import slip_rate
 from glovecal_models.takes.take import Take
 
@@ -54,6 +59,21 @@ def test_a_slip_is_found_with_its_rate(glove):
 def test_the_small_wandering_of_every_glove_is_not_named(glove, noise_deg):
     takes = glove.takes(count=6, seconds=60, shape_counts=every_glove, noise_deg=noise_deg)
     assert SLIP.find(takes, glove.sensor_of, glove.errors(takes)) == ()
+
+
+def of_joints(*likelier_and_size: tuple[float, float]) -> list[SlipComponents | None]:
+    return [SlipComponents(size, likelier, INSIDE, 0.0, 48) for likelier, size in likelier_and_size]
+
+
+def test_joints_slip_alone_or_together_and_by_more_than_a_healthy_glove():
+    nothing = [None] * 4
+    assert joints_that_slip([*of_joints((5.0, 0.7)), *nothing]) == (0,)
+    assert joints_that_slip([*of_joints((14.0, 0.5)), *nothing]) == ()
+    assert joints_that_slip([*of_joints((3.0, 0.7)), *nothing]) == ()
+    assert joints_that_slip([None, *of_joints((3.0, 0.7), (3.0, 0.4), (2.5, 0.4), (1.5, 0.7))]) == (1, 2, 3)
+    assert joints_that_slip([*of_joints((5.0, 0.7)), *[None] * 19]) == ()
+    assert joints_that_slip([*of_joints(*[(3.0, 0.7)] * 4), *[None] * 16]) == ()
+    assert joints_that_slip(of_joints(*[(3.0, 0.7)] * 20)) == tuple(range(20))
 
 
 def test_a_slip_below_the_frame_noise_is_not_named(glove):
