@@ -273,7 +273,7 @@ def study(arguments: list[str]) -> int:
     if arguments[:1] == ["demos"]:
         return run("python", "tests/study/demo_table.py", *arguments[1:])
     if arguments[:1] == ["camera-errors"]:
-        return run("python", "tests/study/tracked_errors.py", *arguments[1:])
+        return run("python", "tests/study/tracked_errors.py", *arguments[1:], beside=SIMULATED)
     if arguments[:1] == ["faults"]:
         return run("python", "tests/study/fault_study.py", *arguments[1:], dev=True)
     if arguments[:1] == ["camera"]:

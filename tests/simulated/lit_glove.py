@@ -2,7 +2,8 @@
 
 For trying the tracker on: nothing of how it draws pictures itself is used. Triangles are filled with what
 lies between their corners (place on the cloth, direction of the surface), twice as fine as the picture; each
-lamp has a map of what it sees, so that fingers shade the palm; iron-on film shines.
+lamp has a map of what it sees, so that fingers shade the palm; iron-on film shines. One moment's light, drawn
+finely, is the same scene for sensors of any size (``averaged``).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.pattern import PRINTED_SRGB
 
 _FINER = 2
+_WEAVE_ACROSS = 1280
+"""Threads of the cloth that the picture's width shows at most: the same on a finer sensor."""
 _LAMP_MAP = 320
 _LAMP_MM = 360.0
 _BIAS_MM = 4.0
@@ -73,12 +76,23 @@ class LitGlove:
     balanced: bool = True
     """Whether the camera's white balance took the light's mean colour away."""
     inks: np.ndarray = field(default_factory=lambda: np.asarray(PRINTED_SRGB, dtype=float))
+    finer: int = _FINER
+    """Samples of a pixel along each side."""
 
     def picture(
         self, angles_deg: np.ndarray, rotation: np.ndarray, position_mm: np.ndarray, number: int = 0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Blue, green, red (H, W, 3) uint8, and the colours truly there (H, W) uint8, of a hand whose palm is
         turned and placed in the first camera's frame."""
+        light, truth = self.light_of(angles_deg, rotation, position_mm)
+        return self.developed(light, number), truth
+
+    def light_of(
+        self, angles_deg: np.ndarray, rotation: np.ndarray, position_mm: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What reaches the sensor, linear red, green, blue (H, W, 3) float32, and the colours truly there
+        (H, W) uint8, of a hand as ``picture`` takes it."""
+        finer = self.finer
         height, width = self.camera.height, self.camera.width
         vertices = self.glove.posed(angles_deg) @ rotation.T + position_mm
         back, places = self.glove.cloth
@@ -87,10 +101,8 @@ class LitGlove:
         triangles = np.concatenate([self.glove.triangles, arm_triangles + len(vertices)])
         is_glove = np.arange(len(triangles)) < len(self.glove.triangles)
         own = everything @ np.array(self.camera.rotation).T + np.array(self.camera.translation_mm)
-        pixels = _projected(own, self.camera) * _FINER + 0.5 * (_FINER - 1)
-        which, shares, _ = _filled(pixels, own[:, 2], triangles, height * _FINER, width * _FINER)
-        v, u = np.nonzero(which >= 0)
-        hit, share = which[v, u], shares[v, u]
+        pixels = _projected(own, self.camera) * finer + 0.5 * (finer - 1)
+        v, u, hit, share = _hit(pixels, own[:, 2], triangles, height * finer, width * finer)
         corners = triangles[hit]
         normal = np.einsum("nk,nka->na", share, _normals(own, triangles)[corners])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
@@ -116,17 +128,21 @@ class LitGlove:
             bright = np.clip((normal * half).sum(axis=1), 0.0, 1.0) ** 24 * (facing > 0)
             shine += self.light.gloss * bright[:, None] * strength
         light = albedo * lit + shine * on_glove[:, None]
-        pixel = v // _FINER * width + u // _FINER
-        covered = np.bincount(pixel, minlength=height * width).reshape(height, width, 1) / _FINER**2
-        light = np.stack([np.bincount(pixel, light[:, c], height * width) for c in range(3)], axis=-1)
-        light = light.reshape(height, width, 3) / _FINER**2
-        picture = (self._behind * (1.0 - covered) + light).astype(np.float32)
-        shown = np.zeros(which.shape, dtype=np.uint8)
-        shown[v, u] = labels
-        truth = shown[_FINER // 2 :: _FINER, _FINER // 2 :: _FINER]
-        return self._developed(picture, number), np.ascontiguousarray(truth)
+        pixel, slot = np.unique(v // finer * width + u // finer, return_inverse=True)
+        covered = np.bincount(slot)[:, None] / finer**2
+        light = np.stack([np.bincount(slot, light[:, c]) for c in range(3)], axis=-1) / finer**2
+        picture = self._behind.astype(np.float32)
+        behind = self._behind.reshape(-1, 3)[pixel]
+        picture.reshape(-1, 3)[pixel] = behind * (1.0 - covered) + light
+        truth = np.zeros((height, width), dtype=np.uint8)
+        middle = (v % finer == finer // 2) & (u % finer == finer // 2)
+        truth[v[middle] // finer, u[middle] // finer] = labels[middle]
+        return picture, truth
 
-    def _developed(self, light: np.ndarray, number: int) -> np.ndarray:
+    def developed(self, light: np.ndarray, number: int) -> np.ndarray:
+        """Blue, green, red (H, W, 3) uint8, by a sensor of as many pixels as ``light`` (H, W, 3) has; its
+        blur and noise are those of a pixel, whatever the size. ``number`` is of the picture, for its noise.
+        """
         rng = np.random.default_rng([self.seed, 52, number])
         total = np.array(self.light.room) + sum(0.5 * np.array(colour) for _, colour in self.light.lamps)
         gain = 0.9 / total.max() * (total.max() / total if self.balanced else np.ones(3))
@@ -144,8 +160,10 @@ class LitGlove:
     @cached_property
     def _weave(self) -> np.ndarray:
         rng = np.random.default_rng([self.seed, 53])
-        shape = (self.camera.height * _FINER, self.camera.width * _FINER)
-        return 1.0 + 0.06 * rng.standard_normal(shape)
+        height, width = self.camera.height * self.finer, self.camera.width * self.finer
+        share = min(1.0, _WEAVE_ACROSS / width)
+        threads = 1.0 + 0.06 * rng.standard_normal((round(height * share), round(width * share)))
+        return cv2.resize(threads, (width, height), interpolation=cv2.INTER_NEAREST)
 
     @cached_property
     def _skin(self) -> np.ndarray:
@@ -206,6 +224,13 @@ class LitGlove:
         return _linear(picture) * (np.array(self.light.room) + 0.35)
 
 
+def averaged(light: np.ndarray, width: int) -> np.ndarray:
+    """(H, W, 3): what a sensor ``width`` pixels across gets of ``light``, each pixel the mean of what it
+    covers."""
+    size = width, round(light.shape[0] * width / light.shape[1])
+    return cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+
+
 def _linear(srgb: np.ndarray) -> np.ndarray:
     share = np.asarray(srgb, dtype=float) / 255.0
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
@@ -229,6 +254,19 @@ def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     for corner in range(3):
         np.add.at(found, triangles[:, corner], across)
     return found / (np.linalg.norm(found, axis=1, keepdims=True) + 1e-12)
+
+
+def _hit(
+    pixels: np.ndarray, depth: np.ndarray, triangles: np.ndarray, height: int, width: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns (N,) of what any triangle covers, the nearest one (N,), shares of its corners (N, 3):
+    filled in their own box, which on a fine sensor is far smaller than the picture."""
+    ahead = pixels[depth >= 20.0]
+    left, top = np.clip(np.floor(ahead.min(axis=0)), 0, (width, height)).astype(int)
+    right, bottom = np.clip(np.ceil(ahead.max(axis=0)) + 1, 0, (width, height)).astype(int)
+    which, shares, _ = _filled(pixels - (left, top), depth, triangles, bottom - top, right - left)
+    v, u = np.nonzero(which >= 0)
+    return v + top, u + left, which[v, u], shares[v, u]
 
 
 @numba.njit(cache=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,8 @@ FIRST_SEED = 9000
 ASIDE_DEG, AROUND_MM = 60.0, 470.0
 """The second camera looks at the same place from the side."""
 SHAPE_HZ = 0.5
-_ORDER = [ROTATIONS.index(name) for name in FINGER_ROTATIONS]
+ORDER = [ROTATIONS.index(name) for name in FINGER_ROTATIONS]
+"""Of a worn hand's angles, as a state has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,53 +86,83 @@ class Study:
         return ColourTable.load(file)
 
 
-def tracked(study: Study, number: int) -> TrackedHand:
-    """A hand of its own, followed both ways at stage dense, in the shape that 50 moments of 100 s give."""
+@dataclass(frozen=True, eq=False)
+class WornHand:
+    """One hand in its room, before the study's cameras."""
+
+    light: str
+    glove: WornGlove
+    rooms: Sequence[LitGlove]
+    """One for each camera."""
+    seed: int
+
+
+Moments = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Angles (N, 20) in the order of ``ROTATIONS``, the palm's turns (N, 3, 3), wrists (N, 3) mm."""
+
+
+def worn_hand(study: Study, number: int) -> WornHand:
     seed, light = study.first_seed + number, (SOFT, HARD)[number % 2]
     glove = family(number + 1, study.first_seed)[number]
     rooms = [
         LitGlove(glove, camera, a_light(light, seed), seed + 977 * place)
         for place, camera in enumerate(study.tracker.cameras)
     ]
+    return WornHand(light, glove, rooms, seed)
+
+
+def moments_to_fit(hand: WornHand, count: int = MOST_PICTURES) -> Moments:
+    """Of the hand's shape: apart from those that are tracked."""
+    return free_motion(count / SHAPE_HZ, SHAPE_HZ, hand.seed + 400)
+
+
+def fitted_tracker(study: Study, hand: WornHand) -> tuple[HandTracker, HandShape | None]:
+    """In the shape that 50 moments of 100 s give; where it is refused, as the hand's sizes say."""
+    views = [
+        [study.colours.labels(room.picture(*moment, 1000 + index)[0]) for room in hand.rooms]
+        for index, moment in enumerate(zip(*moments_to_fit(hand), strict=True))
+    ]
+    try:
+        shape = fitted_hand_shape(study.tracker, views).shape
+    except BadInput:  # the command goes on without
+        return study.tracker, None
+    return with_shape(study.tracker, shape), shape
+
+
+def tracked(study: Study, number: int) -> TrackedHand:
+    """A hand of its own, followed both ways at stage dense."""
+    hand = worn_hand(study, number)
     first, bones = study.tracker, None
     if study.fits_shape:
-        angles, turns, places = free_motion(MOST_PICTURES / SHAPE_HZ, SHAPE_HZ, seed + 400)
-        views = [
-            [study.colours.labels(room.picture(*moment, 1000 + index)[0]) for room in rooms]
-            for index, moment in enumerate(zip(angles, turns, places, strict=True))
-        ]
-        try:
-            fitted = fitted_hand_shape(first, views)
-        except BadInput:  # the command goes on without
-            pass
-        else:
-            bones = _bones_off(fitted.shape, glove)
-            first = with_shape(first, fitted.shape)
-    angles, turns, places = free_motion(study.seconds, RATE_HZ, seed)
+        first, shape = fitted_tracker(study, hand)
+        bones = None if shape is None else _bones_off(shape, hand.glove)
+    angles, turns, places = free_motion(study.seconds, RATE_HZ, hand.seed)
     right = [0, 0]
 
     def moments() -> Iterator[tuple[list[np.ndarray], float]]:
         for index, moment in enumerate(zip(angles, turns, places, strict=True)):
             found = []
-            for room in rooms:
+            for room in hand.rooms:
                 picture, truth = room.picture(*moment, index)
                 found.append(study.colours.labels(picture))
                 right[0] += int((found[-1][truth > 0] == truth[truth > 0]).sum())
                 right[1] += int((truth > 0).sum())
             yield found, index / RATE_HZ
 
-    forwards, backwards = (
-        HandTracker(first.hand, first.lookup, first.cameras, first.errors) for _ in range(2)
-    )
     rows = []
-    for frame, pose in enumerate(followed_both_ways(forwards, backwards, moments())):
+    for frame, pose in enumerate(followed_both_ways(afresh(first), afresh(first), moments())):
         if pose is not None:
-            truth = angles[frame][_ORDER]
+            truth = angles[frame][ORDER]
             sd = pose.standard_deviation[: len(truth)]
             rows.append((frame, truth, pose.state.angles_deg - truth, sd, pose.accepted))
     frames, true, errors, deviations, accepted = (np.array(column) for column in zip(*rows, strict=True))
     pixels = right[0], right[1]
-    return TrackedHand(light, frames, true, errors, deviations, accepted, pixels, bones)
+    return TrackedHand(hand.light, frames, true, errors, deviations, accepted, pixels, bones)
+
+
+def afresh(tracker: HandTracker) -> HandTracker:
+    """The same one, which has seen nothing yet."""
+    return HandTracker(tracker.hand, tracker.lookup, tracker.cameras, tracker.errors)
 
 
 def _bones_off(shape: HandShape, glove: WornGlove) -> tuple[float, float]:

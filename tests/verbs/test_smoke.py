@@ -44,6 +44,7 @@ VERBS = (
     "study active",
     "study offline",
     "study planted",
+    "study camera-errors --help",
     "fresh",
     "containers",
     "sbom",
@@ -170,6 +171,13 @@ def test_study_of_recordings_tells_what_a_delay_buys(smoke) -> None:
 
 def test_study_of_planted_faults_tells_nothing_of_a_healthy_glove(smoke) -> None:
     assert smoke["study planted"].result().number(r"simulated, healthy \|[ |]* (\d+) of 1 ") == 0
+
+
+def test_study_of_the_cameras_errors_begins(smoke) -> None:
+    """Its smallest work draws and tracks for a minute."""
+    said = smoke["study camera-errors --help"].result()
+    assert said.code == 0, said.text
+    assert "--first-seed" in said.text
 
 
 def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> None:
