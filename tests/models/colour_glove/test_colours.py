@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from other_gloves import other_hand
@@ -11,7 +12,12 @@ from sklearn.mixture import GaussianMixture
 from glovecal_models.colour_glove.camera_model import Camera
 from glovecal_models.colour_glove.database import PoseDatabase
 from glovecal_models.colour_glove.lookup import PoseLookup, pca_code
-from glovecal_models.colour_glove.pattern import encoded_light, glove_pattern, linear_light
+from glovecal_models.colour_glove.pattern import (
+    PRINTED_SRGB,
+    encoded_light,
+    glove_pattern,
+    linear_light,
+)
 from glovecal_models.colour_glove.photograph import (
     Photograph,
     Photographer,
@@ -19,7 +25,14 @@ from glovecal_models.colour_glove.photograph import (
     hand_motion,
     labelled_photographs,
 )
-from glovecal_models.colour_glove.pictures.classify import ColourTable, _Mixture, drawn_colours, many_coloured
+from glovecal_models.colour_glove.pictures.classify import (
+    ColourTable,
+    _Mixture,
+    drawn_colours,
+    many_coloured,
+    smoothed,
+    with_edges,
+)
 from glovecal_models.colour_glove.pictures.white_balance import Gains, blind_gains, white_gains
 from glovecal_models.colour_glove.skin import hand_skin
 from glovecal_models.errors import BadInput
@@ -169,3 +182,23 @@ def test_what_is_no_white_is_refused():
         white_gains(uneven, np.zeros((30, 30), bool))
     with pytest.raises(BadInput, match="each must be"):
         Gains(9.0, 1.0, 1.0)
+
+
+def test_mixed_pixels_of_edges_take_a_side():
+    """Stripes as wide as fingers, seen through a lens and JPEG: mixtures are no third colour, and no hole."""
+    truth = np.zeros((120, 200), np.uint8)
+    for stripe, (low, high) in enumerate(((3, 7), (1, 5), (8, 2), (6, 10))):
+        truth[20 + 24 * stripe : 36 + 24 * stripe, 20:100] = low
+        truth[20 + 24 * stripe : 36 + 24 * stripe, 100:180] = high
+    colours = np.vstack([[150, 150, 145], np.asarray(PRINTED_SRGB)])[:, ::-1].astype(np.uint8)
+    seen = cv2.GaussianBlur(colours[truth], (0, 0), 0.8)
+    _, packed = cv2.imencode(".jpg", seen, [cv2.IMWRITE_JPEG_QUALITY, 88])
+    picture = smoothed(np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR)))
+    apart = np.linalg.norm(picture[..., None, :].astype(float) - colours, axis=-1)
+    rough = np.where(apart.min(axis=-1) < 30.0, apart.argmin(axis=-1), 0).astype(np.uint8)
+    edges = cv2.dilate(truth, np.ones((5, 5), np.uint8)) != cv2.erode(truth, np.ones((5, 5), np.uint8))
+    found = with_edges(picture, rough)
+    before, after = (float((labels[edges] == truth[edges]).mean()) for labels in (rough, found))
+    assert before < 0.9, before
+    assert after > 0.99, after
+    np.testing.assert_array_equal(found[~edges], truth[~edges])

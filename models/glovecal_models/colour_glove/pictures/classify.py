@@ -204,42 +204,49 @@ def colours_of_areas(labels, areas, count):  # type: ignore[no-untyped-def]
 
 
 def with_edges(picture: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Labels (H, W) with the mixed pixels along edges given to the side they look more like.
+    """Labels (H, W) with the pixels along edges given to the side they look more like.
 
-    A pixel without a colour, two or fewer from one that has one, takes the label of the most similar pixel
-    of the 5 x 5 around it; among those without a colour only what lies deeper counts. What lies between two
-    patches is a mixture of both, and looks like neither: it takes that of the more similar one.
+    What lies between two patches, or between glove and background, is a mixture of both and may look like a
+    third colour, or like none: the lens mixes neighbours, and JPEG keeps colours at half the resolution. So a
+    pixel whose neighbours are not all of its label, and one without a label up to ``_EDGE_PX`` from one that
+    has one, takes the label of the most similar pixel around it that is no mixture: one whose neighbours
+    agree, or one farther from the glove than that.
     """
+    neighbours = np.ones((3, 3), np.uint8)
     glove = (labels > 0).astype(np.uint8)
-    deep = cv2.dilate(glove, np.ones((3, 3), np.uint8)) == 0
-    near = (cv2.dilate(glove, np.ones((5, 5), np.uint8)) > 0) & (glove == 0)
-    between = cv2.morphologyEx(glove, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
-    rows, columns = np.nonzero(near & ~between)
-    outside = most_alike(picture, labels, deep, rows, columns)
-    rows, columns = np.nonzero(near & between)
-    inside = most_alike(picture, labels, np.zeros_like(deep), rows, columns)
-    return np.where(near & between, inside, outside)
+    near = cv2.dilate(glove, np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8)) > 0
+    beyond = cv2.dilate(glove, np.ones((2 * _EDGE_PX + 3,) * 2, np.uint8)) == 0
+    inner = (labels > 0) & (cv2.erode(labels, neighbours) == cv2.dilate(labels, neighbours))
+    rows, columns = np.nonzero(near & ~inner)
+    return most_alike(picture, labels, inner | beyond, rows, columns)
+
+
+_EDGE_PX = 3
+"""How far an edge's colours reach, at the working size."""
+_ALIKE_PX = 5
+"""How far away the pixel is looked for that is most alike."""
 
 
 @numba.njit(cache=True)
-def most_alike(picture, labels, deep, rows, columns):  # type: ignore[no-untyped-def]
+def most_alike(picture, labels, pure, rows, columns):  # type: ignore[no-untyped-def]
+    """Kernel: labels where each pixel listed has that of the most similar ``pure`` (H, W) one around it, or
+    its own where there is none."""
     height, width = labels.shape
     found = labels.copy()
     for index in range(len(rows)):
         row, column = rows[index], columns[index]
         blue, green, red = picture[row, column]
-        best, label = 1 << 30, 0
-        for v in range(max(0, row - 2), min(height, row + 3)):
-            for u in range(max(0, column - 2), min(width, column + 3)):
-                if labels[v, u] == 0 and not deep[v, u]:
+        best = 1 << 30
+        for v in range(max(0, row - _ALIKE_PX), min(height, row + _ALIKE_PX + 1)):
+            for u in range(max(0, column - _ALIKE_PX), min(width, column + _ALIKE_PX + 1)):
+                if not pure[v, u]:
                     continue
                 a = int(blue) - int(picture[v, u, 0])
                 b = int(green) - int(picture[v, u, 1])
                 c = int(red) - int(picture[v, u, 2])
                 apart = a * a + b * b + c * c
                 if apart < best:
-                    best, label = apart, labels[v, u]
-        found[row, column] = label
+                    best, found[row, column] = apart, labels[v, u]
     return found
 
 
