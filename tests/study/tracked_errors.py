@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import picture_sizes
 from error_learning import CLIPS, learned_errors, learned_on_fitted_hands
 from lit_glove import HARD, SOFT
 from simulated_camera import ERRORS, towards_prior
@@ -159,6 +160,9 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--unfitted", action="store_true", help="no hand's shape is fitted first")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="of the first hand")
     parser.add_argument("--learn", action="store_true", help="write what the tracker states of its errors")
+    parser.add_argument(
+        "--sizes", action="store_true", help="two hands (from seed 9300) by sensors of 640 to 3840 pixels"
+    )
     parser.add_argument("--smoke", action="store_true", help="two hands for half a second, a small database")
     options = parser.parse_args(arguments)
     pin_blas_to_one_thread()
@@ -170,6 +174,11 @@ def main(arguments: Sequence[str]) -> int:
     database.mkdir(parents=True, exist_ok=True)
     if options.learn:
         learn(database, CLIPS)
+        return 0
+    if options.sizes:
+        text = picture_sizes.report(database, ENTRIES)
+        print(text)
+        (options.folder / "camera-sizes.md").write_text(text, encoding="utf-8")
         return 0
     text = report(
         database, options.hands, SECONDS, entries=ENTRIES, fits_shape=not options.unfitted,

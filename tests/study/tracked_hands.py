@@ -111,16 +111,12 @@ def worn_hand(study: Study, number: int) -> WornHand:
     return WornHand(light, glove, rooms, seed)
 
 
-def moments_to_fit(hand: WornHand, count: int = MOST_PICTURES) -> Moments:
-    """Of the hand's shape: apart from those that are tracked."""
-    return free_motion(count / SHAPE_HZ, SHAPE_HZ, hand.seed + 400)
-
-
 def fitted_tracker(study: Study, hand: WornHand) -> tuple[HandTracker, HandShape | None]:
     """In the shape that 50 moments of 100 s give; where it is refused, as the hand's sizes say."""
+    apart = free_motion(MOST_PICTURES / SHAPE_HZ, SHAPE_HZ, hand.seed + 400)
     views = [
         [study.colours.labels(room.picture(*moment, 1000 + index)[0]) for room in hand.rooms]
-        for index, moment in enumerate(zip(*moments_to_fit(hand), strict=True))
+        for index, moment in enumerate(zip(*apart, strict=True))
     ]
     try:
         shape = fitted_hand_shape(study.tracker, views).shape
