@@ -29,7 +29,9 @@
                             study demos: is anything told in fifty demos that is not so? (half an hour);
                             study camera: a camera as the reference against true angles
                             (a quarter of an hour);
-                            study camera-errors: what the colour glove's tracker errs by (an hour);
+                            study camera-errors: what the colour glove's tracker errs by (an hour;
+                            --sizes: the same scene at 640 to 3840 pixels, half an hour);
+                            study camera-applications: the examples driven by a camera's poses (an hour);
                             study faults: kills, cuts, full disks at random: is anything lost? (two minutes;
                             --faults N, --seed S, --minutes N; --table lists what is tried)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;
@@ -274,6 +276,9 @@ def study(arguments: list[str]) -> int:
         return run("python", "tests/study/demo_table.py", *arguments[1:])
     if arguments[:1] == ["camera-errors"]:
         return run("python", "tests/study/tracked_errors.py", *arguments[1:], beside=SIMULATED)
+    if arguments[:1] == ["camera-applications"]:
+        beside = (*SIMULATED, "client/examples")
+        return run("python", "tests/study/camera_applications.py", *arguments[1:], dev=True, beside=beside)
     if arguments[:1] == ["faults"]:
         return run("python", "tests/study/fault_study.py", *arguments[1:], dev=True)
     if arguments[:1] == ["camera"]:

@@ -45,6 +45,7 @@ VERBS = (
     "study offline",
     "study planted",
     "study camera-errors --help",
+    "study camera-applications",
     "fresh",
     "containers",
     "sbom",
@@ -178,6 +179,12 @@ def test_study_of_the_cameras_errors_begins(smoke) -> None:
     said = smoke["study camera-errors --help"].result()
     assert said.code == 0, said.text
     assert "--first-seed" in said.text
+
+
+def test_study_of_the_examples_tells_what_errors_leave(smoke) -> None:
+    said = smoke["study camera-applications"].result()
+    assert said.number(r"\| 1 degrees, of 0\.5 s \| (\d+) % ") == 100
+    assert said.number(r"\| 12 degrees, that stay (?:\| \d+ % ){2}\| (\d+) % ") < 100
 
 
 def test_fresh_asks_a_new_clone(smoke, not_here: Callable[[str], NoReturn]) -> None:
