@@ -244,7 +244,7 @@ def near_the_system() -> list[str]:
 
 
 def bench(arguments: list[str]) -> int:
-    if arguments[:1] == ["streaming"]:  # it needs none of the peers
+    if arguments[:1] in (["streaming"], ["improvement"]):  # they need none of the peers
         return run("python", "tests/bench/bench.py", *arguments)
     if arguments[:1] in (["studio"], ["lists"], ["capacity"]):
         return run("python", "tests/bench/bench.py", *arguments, dev=True, beside=STUDIO)

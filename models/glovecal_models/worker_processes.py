@@ -113,23 +113,30 @@ def shared_workers(workers: int, what: str, cancelled: Cancel | None) -> Iterato
 
 
 def side_by_side(
-    work: Callable[[Task, Cancel | None], Result], tasks: Sequence[Task], cancelled: Cancel | None = None
+    work: Callable[[Task, Cancel | None], Result],
+    tasks: Sequence[Task],
+    cancelled: Cancel | None = None,
+    *,
+    at_once: bool = False,
 ) -> Iterator[Result]:
-    """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` that ``cancelled`` brings.
-    Where there are none this process does it, each when it is asked for.
+    """``work`` of each task, in the order of ``tasks``, by the ``shared_workers`` that ``cancelled`` brings,
+    which begin when this is called. Where there are none this process does it, each when it is asked for.
 
     ``work`` as in ``work_off``; it is also told when to stop, unless in a worker, which is ended. Whoever
-    asks for no further result leaves the rest undone. Raises Cancelled, WorkerDied, and of what ``work``
-    raises the error of the first task.
+    asks for no further result leaves the rest undone, unless all tasks are handed out ``at_once``, to be done
+    beside other work. Raises Cancelled, WorkerDied, and of what ``work`` raises the error of the first task.
     """
     pool = cancelled.pool if isinstance(cancelled, _CancelWithPool) else None
     if pool is None or len(tasks) < 2:
-        for task in tasks:
-            yield work(task, cancelled)
-        return
+        return (work(task, cancelled) for task in tasks)
+    safe = partial(_result_or_error, work)
+    return _in_order(pool.results(safe, tasks, cancelled, len(tasks) if at_once else None))
+
+
+def _in_order(results: Iterator[tuple[int, Result | Exception]]) -> Iterator[Result]:
     early: dict[int, Result | Exception] = {}
     wanted = 0
-    for number, result in pool.results(partial(_result_or_error, work), tasks, cancelled):
+    for number, result in results:
         early[number] = result
         while wanted in early:
             outcome = early.pop(wanted)
@@ -179,15 +186,33 @@ class _Pool:
             self._ended.get()
 
     def results(
-        self, work: Callable[[Task], Result], tasks: Iterable[Task], cancelled: Cancel | None
+        self,
+        work: Callable[[Task], Result],
+        tasks: Iterable[Task],
+        cancelled: Cancel | None,
+        ahead: int | None = None,
     ) -> Iterator[tuple[int, Result]]:
-        """The number and the result of each task, in any order."""
+        """The number and the result of each task, in any order; so many tasks are handed out ``ahead``, one
+        for each worker by default, when this is called."""
         answers: SimpleQueue[Any] = SimpleQueue()
         orders = (_Order(work, number, task, answers) for number, task in enumerate(tasks))
-        unanswered = 0
-        for order in islice(orders, self._workers):
+        return self._answers(answers, orders, self._ordered(orders, ahead or self._workers), cancelled)
+
+    def _ordered(self, orders: Iterator[_Order], most: int) -> int:
+        """How many of the next ``most`` there were."""
+        count = 0
+        for order in islice(orders, most):
             self._orders.put(order)
-            unanswered += 1
+            count += 1
+        return count
+
+    def _answers(
+        self,
+        answers: SimpleQueue[Any],
+        orders: Iterator[_Order],
+        unanswered: int,
+        cancelled: Cancel | None,
+    ) -> Iterator[tuple[int, Any]]:
         while unanswered:
             stop_if(cancelled, self._what)
             try:
@@ -196,10 +221,7 @@ class _Pool:
                 continue
             if error is not None:
                 raise error
-            unanswered -= 1
-            for order in islice(orders, 1):
-                self._orders.put(order)
-                unanswered += 1
+            unanswered += self._ordered(orders, 1) - 1
             yield number, result
 
     def _oversee(self) -> None:

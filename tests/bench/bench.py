@@ -1,9 +1,9 @@
 """``python3 do.py bench``: Glovecal beside its peers, in one run, as ratios.
 
-Eight parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
+Nine parts: Gaussian-process training and prediction against scikit-learn, GPy, GPyTorch and GPBoost, capture
 to pose through real zenoh, the same with a site's certificates beside one without, inverse kinematics against
 mink, the studio's Live page in a browser, live bridges, retargeting to skeletons like those of other
-programs, and lists of a store that is large. Figures and the picture go to a folder.
+programs, lists of a store that is large, and what improving takes. Figures and the picture go to a folder.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ PARTS = {
     "retargeting": "retargeting_table.py",
     "lists": "lists_bench.py",
     "capacity": "capacity_bench.py",
+    "improvement": "improvement_bench.py",
 }
 USUAL = tuple(
     name
     for name in PARTS
-    if name not in ("certificates", "studio", "bridges", "retargeting", "lists", "capacity")
+    if name not in ("certificates", "studio", "bridges", "retargeting", "lists", "capacity", "improvement")
 )
-"""The first three want a quiet computer, the studio a browser too; the last three have no peer."""
+"""The first three want a quiet computer, the studio a browser too; the last four have no peer."""
 OF_STREAMING = ("gloves", "people", "processes", "recordings", "seconds")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 

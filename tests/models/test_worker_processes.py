@@ -10,11 +10,12 @@ import sys
 import time
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from glovecal_models.errors import BadInput, Cancelled, WorkerDied
-from glovecal_models.worker_processes import work_off
+from glovecal_models.worker_processes import shared_workers, side_by_side, work_off
 
 LARGE = bytes(30_000_000)
 """A task that takes much longer to write than a pipe's buffer."""
@@ -97,6 +98,19 @@ def test_a_task_is_asked_for_when_a_worker_is_free() -> None:
 
     work_off(math.sqrt, tasks(), 2, lambda number, _: found.append(number), "the work")
     assert sorted(found) == asked == list(range(6))
+
+
+def test_tasks_handed_out_at_once_are_done_beside_other_work(tmp_path) -> None:
+    files = [tmp_path / str(number) for number in range(5)]
+    for file in files:
+        file.touch()
+        os.utime(file, (0, 0))
+    with shared_workers(2, "the work", None) as stopped:
+        touch: Any = os.utime
+        done = side_by_side(touch, files, stopped, at_once=True)
+        while not all(file.stat().st_mtime for file in files):
+            time.sleep(0.01)
+        assert list(done) == [None] * 5
 
 
 def test_a_cancel_ends_it_while_tasks_are_written() -> None:

@@ -89,13 +89,17 @@ def fit_with_effects(
     found: list[Mapping[str, LmcOptimum]] = []
 
     def trained() -> None:
-        known = optima[min(len(found), len(optima) - 1)] if optima else {}
+        known = dict(optima[min(len(found), len(optima) - 1)]) if optima else {}
+        if found:  # the turn before is nearer than what was found in more takes
+            near = {name: found[-1].get(name, each).parameters for name, each in known.items()}
+            known = {name: each._replace(parameters=near[name]) for name, each in known.items()}
+        moved = [name for name in rotations if not found or name in corrected]
         tasks = []
-        for name in rotations:
+        for name in moved:
             # Only its own: the same fit is known again whatever other rotations are trained beside.
             own = ((name, known[name]),) if name in known else ()
             tasks.append(_task(takes, columns[name], corrected.get(name), replace(settings, optima=own)))
-        results.update(zip(rotations, KNOWN_FITS.fit(tasks, cancelled=cancelled), strict=True))
+        results.update(zip(moved, KNOWN_FITS.fit(tasks, cancelled=cancelled), strict=True))
         found.append(found_optima({name: item.settings for name, item in results.items()}))
 
     def own_signals() -> dict[str, OwnSignal]:

@@ -308,16 +308,17 @@ def left_out_wearings(
     *,
     optima: Optima = (),
     cancelled: Cancel | None = None,
-) -> list[LeftOutWearing]:
-    """Empty with a single wearing. ``optima`` as in ``held_out_errors``. Raises Cancelled."""
+) -> Iterator[LeftOutWearing]:
+    """None with a single wearing. ``optima`` as in ``held_out_errors``. Workers begin when this is called and
+    go on beside other work; without any, wearings are left out when they are asked for. Raises Cancelled,
+    WorkerDied."""
     wearings = [take.wearing for take in takes.takes]
     groups = wearing_groups(wearings)
     masks = [np.array([name in group for name in wearings]) for group in groups]
-    found = measured_without(
-        _left_out_wearings, takes, masks, rotations, wanted, left_out_settings(settings),
-        optima=optima, cancelled=cancelled,
-    )  # fmt: skip
-    return [item for _, of_group in found for item in of_group]
+    recipe = takes, tuple(rotations), tuple(wanted), left_out_settings(settings), optima
+    work = partial(_measured, _left_out_wearings, recipe, True)
+    found = side_by_side(work, masks, cancelled, at_once=True)
+    return (item for of_group in found for item in of_group or ())
 
 
 def _left_out_wearings(of: FitWithout) -> list[LeftOutWearing]:

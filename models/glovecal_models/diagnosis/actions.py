@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -133,15 +134,16 @@ def _action(
         return Action(item, None, method=TRAIN_OTHERWISE)
     best, of_the_base = Action(item, None), dict(relations().of_the_base)
     for each in explaining(item.column, sensor, own):
-        if (each.name, item.rotation) in has:
+        # A column that only has a name comes last: it is taken where no physical effect saves anything.
+        if (each.name, item.rotation) in has or (best.saves and not each.about.is_physical):
             continue
-        rmse = formed_rmse(design, each, design.rotations.index(item.rotation), seed)
+        work = partial(formed_rmse, design, each, design.rotations.index(item.rotation), seed)
+        rmse = design.once(f"{each.name} in a form on {item.rotation}", work)
         if rmse is None:
             continue
         method = of_the_base.get(each.name) if linear else None
         tried = Action(item, each.name, each.about.is_physical, method, rmse)
-        # A column that only has a name comes last: it is taken where no physical effect saves anything.
-        if tried.saves and (not best.saves or (each.about.is_physical and _saved(tried) > _saved(best))):
+        if tried.saves and (not best.saves or _saved(tried) > _saved(best)):
             best = tried
     return best
 

@@ -101,15 +101,19 @@ class FormInputs:
 def formed_rmse(
     design: ForwardDesign, effect: CorrectionEffect, joint: int, seed: int = 0
 ) -> HeldOutRmse | None:
-    """Degrees; None where these takes cannot show the effect, or allow no control."""
-    control = _control(design, effect, joint, seed)
-    if control is None:
-        return None
+    """Degrees; None where these takes cannot show the effect, or allow no control. Beside one that saves
+    nothing no control is worked out: it is infinite."""
     takes = design.of_joint(joint)
+    if effect.not_applicable_reason(takes) is not None:
+        return None
     settings, shape = _settings(effect, takes)
     right = FormInputs.of(design, joint, effect, takes, settings, shape)
-    squares = (_base(design, joint), _squared(design, joint, right), control)
-    return HeldOutRmse(*(float(np.sqrt(square / _count(design, joint))) for square in squares))
+    before, after = _base(design, joint), _squared(design, joint, right)
+    control = _control(design, effect, joint, seed) if after < before else np.inf
+    if control is None:
+        return None
+    rows = _count(design, joint)
+    return HeldOutRmse(*(float(np.sqrt(square / rows)) for square in (before, after, control)))
 
 
 def formed_control_share(

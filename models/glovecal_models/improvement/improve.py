@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from glovecal_models.calibration.training_settings import (
     settings_of,
     trained_rotations,
 )
-from glovecal_models.calibration.unseen_wearing import unseen_wearing
+from glovecal_models.calibration.unseen_wearing import LeftOutWearing, unseen_wearing
 from glovecal_models.ceiling.black_box_ceiling import black_box_ceiling
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
@@ -129,6 +129,8 @@ class _Loop:
     errors: HeldOutErrors = field(default_factory=lambda: HeldOutErrors({}, {}))
     has_looked: bool = False
     found_before: FoundBefore = field(default_factory=FoundBefore)
+    left_out: Iterator[LeftOutWearing] | None = None
+    """Wearings that the base has not seen, while they are being fitted."""
 
     @property
     def layout(self) -> Layout:
@@ -144,8 +146,9 @@ class _Loop:
         self.usable = replace(self.usable, layout=model.layout)  # what the base is read from stays
         self.settings = settings_of(model, self.settings)
         self._say("measuring the base on held-out takes", 0.1)
-        self.errors = self._held_out(model)
-        model = self._with_unseen_wearing(model)
+        question = PreparedTakes.of(self.takes, self.layout), trained_rotations(model), (), self.settings
+        self.errors = held_out_errors(*question, optima=optima_of(model), cancelled=self.cancelled)
+        self.left_out = left_out_wearings(*question, optima=optima_of(model), cancelled=self.cancelled)
         self._step(model, None)
 
     def go_on(self) -> bool:
@@ -188,6 +191,7 @@ class _Loop:
 
     def finished(self, *, ceiling: bool) -> Improvement:
         """Sum up."""
+        self._with_unseen_wearing()
         floors, limits = self._floors(), self.limits.comparison
         stopped = why_stopped(self.stopped, self.steps, floors, self.diagnosis, limits)
         names = trained_rotations(self.steps[0].model)
@@ -234,6 +238,7 @@ class _Loop:
         confidence_set: tuple[str, ...] = (),
         action: Action | None = None,
     ) -> bool:
+        self._with_unseen_wearing()
         model = self.steps[-1].model
         every = trained_rotations(model)
         chosen = (
@@ -343,22 +348,14 @@ class _Loop:
     def _repaired(self) -> list[Take]:
         return repaired_takes(self.takes, requested_effects(self.steps[-1].model))
 
-    def _held_out(self, model: CalibrationModel) -> HeldOutErrors:
-        prepared = PreparedTakes.of(self.takes, self.layout)
-        return held_out_errors(
-            prepared, trained_rotations(model), [], self.settings, optima=optima_of(model),
-            cancelled=self.cancelled,
-        )  # fmt: skip
-
-    def _with_unseen_wearing(self, model: CalibrationModel) -> CalibrationModel:
-        """The base with its error in a wearing that it has not seen."""
-        prepared = PreparedTakes.of(self.takes, self.layout)
-        names = trained_rotations(model)
-        left_out = left_out_wearings(
-            prepared, names, [], self.settings, optima=optima_of(model), cancelled=self.cancelled
-        )
-        wearings = [take.wearing for take in self.takes]
-        return replace(model, unseen_wearing=unseen_wearing(wearings, left_out, noise_of(model.rotations)))
+    def _with_unseen_wearing(self) -> None:
+        """The base gets its error in a wearing that it has not seen, once the diagnosis beside it is done."""
+        if self.left_out is None:
+            return
+        base, wearings = self.steps[0].model, [take.wearing for take in self.takes]
+        unseen = unseen_wearing(wearings, list(self.left_out), noise_of(base.rotations))
+        self.steps[0] = replace(self.steps[0], model=replace(base, unseen_wearing=unseen))
+        self.left_out = None
 
     def _step(self, model: CalibrationModel, added: AddedInStep | None) -> None:
         per_rotation, overall = step_errors(model, self.holdout, self.errors)

@@ -12,7 +12,12 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, columnless_effects
-from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
+from glovecal_models.calibration.effect_fit import (
+    EffectFit,
+    correspondence_for,
+    fit_with_effects,
+    optima_of,
+)
 from glovecal_models.calibration.learned_lead import with_leads
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors, left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
@@ -53,9 +58,9 @@ def child_model(
     """
     fresh = {name: _rotation_model(takes, name, fit, errors, settings) for name in fit.results}
     rotations = tuple(_renewed(item, fresh.get(item.rotation)) for item in parent.rotations)
-    left_out = left_out_wearings(
-        takes, tuple(fresh), wanted, settings, optima=fit.optima, cancelled=cancelled
-    )
+    left_out = [
+        *left_out_wearings(takes, tuple(fresh), wanted, settings, optima=fit.optima, cancelled=cancelled)
+    ]
     if parent.unseen_wearing is not None:
         left_out += [item for item in parent.unseen_wearing.left_out if item.rotation not in fresh]
     wearings = [take.wearing for take in takes.takes]
@@ -161,8 +166,9 @@ def errors_if_redundant(
     )
     most_square = frames * most_deg**2
     without = held_out_errors(
-        prepared, tuple(now.square), wanted, settings, most_square=most_square, cancelled=cancelled
-    )
+        prepared, tuple(now.square), wanted, settings, optima=optima_of(model), most_square=most_square,
+        cancelled=cancelled,
+    )  # fmt: skip
     is_redundant = sum(without.square.values()) <= most_square and without.overall_deg <= most_deg
     return without if is_redundant else None
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, Significanc
 
 BLOCK_ROWS = 125
 """5 s of the rows that are fitted."""
+MOST_EXACT_RANKS = 25
 
 
 def saved_share(before: np.ndarray, after: np.ndarray) -> float:
@@ -273,13 +273,26 @@ def squared_in_blocks(residual: Sequence[np.ndarray], starts: np.ndarray) -> np.
 
 def signed_rank(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blocks) -> float:
     """One-sided Wilcoxon: the p value of positive values against symmetry about zero; 1 for fewer than
-    ``fewest``."""
+    ``fewest``. Exact up to 25 values, else by the normal approximation; zeros do not count."""
     if len(values) < fewest or not np.any(values):
         return 1.0
-    from scipy.stats import wilcoxon  # takes a second to load, and every effect imports this file
+    is_exact, values = len(values) <= MOST_EXACT_RANKS, values[values != 0]
+    _, at, alike = np.unique(np.abs(values), return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(alike) - (alike - 1) / 2)[at]
+    positive, count = float(ranks[values > 0].sum()), len(values)
+    if is_exact:
+        return float(_rank_sums(count)[int(positive) :].sum())
+    variance = (count * (count + 1) * (2 * count + 1) - float((alike**3 - alike).sum()) / 2) / 24
+    return _beyond((positive - count * (count + 1) / 4) / math.sqrt(variance))
 
-    found: Any = wilcoxon(values, alternative="greater", method="exact" if len(values) <= 25 else "approx")
-    return float(found.pvalue)
+
+@cache
+def _rank_sums(count: int) -> np.ndarray:
+    """Probabilities of each sum of those ranks, 1 to ``count``, that have a positive sign by chance."""
+    found = np.ones(1)
+    for rank in range(1, count + 1):
+        found = (np.pad(found, (0, rank)) + np.pad(found, (rank, 0))) / 2
+    return found
 
 
 def random_signs(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_blocks) -> float:
@@ -288,7 +301,12 @@ def random_signs(values: np.ndarray, fewest: int = SIGNIFICANCE_LIMITS.fewest_bl
     scale = float(np.sqrt(np.sum(values**2)))
     if len(values) < fewest or scale == 0:
         return 1.0
-    return 0.5 * math.erfc(float(values.sum()) / scale / math.sqrt(2.0))
+    return _beyond(float(values.sum()) / scale)
+
+
+def _beyond(z: float) -> float:
+    """Probability of more than ``z`` standard deviations."""
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
 def over_joints(
