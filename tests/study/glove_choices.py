@@ -139,9 +139,8 @@ UNDECIDED_SIZES = (0.65, 1.3)
 
 
 def undecided(name: str, number: int, *, set_aside: bool = False) -> BlindGlove | None:
-    """A weak cause in few short takes, as leaves rivals; None where there is no such form."""
-    found = with_cause("next-take", name, UNDECIDED_SIZES[number % 2], number, set_aside=set_aside)
-    return None if found is None else replace(found, wearings=2, takes_per_wearing=3, take_s=25.0)
+    """A weak cause, as leaves rivals; None where there is no such form. In few short takes none is named."""
+    return with_cause("next-take", name, UNDECIDED_SIZES[number % 2], number, set_aside=set_aside)
 
 
 def effect_names(wanted: Sequence[str] | None) -> tuple[str, ...]:

@@ -81,5 +81,6 @@ def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> list[Take]:
         motion = cast(TakeMotion, asked.motion)
         return [glove.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat)]
     if asked.motion == CROSSED.name:
-        return glove.crossed(CROSSED.seconds / 3, repeat)
+        rounds, each_s = CROSSED.takes // 3, CROSSED.seconds / CROSSED.takes
+        return [take for turn in range(rounds) for take in glove.crossed(each_s, rounds * repeat + turn)]
     return [glove.also("natural", NEW_WEARING_S, glove.wearings + repeat)]

@@ -285,7 +285,7 @@ PARTS: dict[str, StudyPart] = {
         demanded="Two effects",
     ),
     "next-take": StudyPart(
-        "weak effects in few short takes: does the proposed take settle what is undecided?",
+        "weak effects: does the proposed take settle what is undecided?",
         _next_take,
         next_take_answer,
         next_take_figures,

@@ -130,7 +130,7 @@ def test_what_separates_rivals_comes_first_and_taps_are_no_take() -> None:
     plan = lacking.plan(crossed)
     assert plan is not None
     [step] = plan.steps
-    assert (step.takes, step.seconds, step.separates, step.opens) == (3, 40, ("a", "b"), ("c",))
+    assert (step.takes, step.seconds, step.separates, step.opens) == (9, 20, ("a", "b"), ("c",))
     assert "Tells apart: a, b." in plan.sentences[0]
     assert LackingTakes().plan(asked_take(TAPS.name, TAPS.what, 40, ("a", "b"))) is None
     assert lacking.plan(asked_take("more_takes", "", 9, ("c", "chance"))) == lacking.plan()

@@ -187,9 +187,10 @@ SHUFFLED = Motion(
 CROSSED = Motion(
     "crossed",
     "Change one thing at a time: put in a fresh battery without switching off, take the glove off and on"
-    " without switching off, switch off and on without taking it off; 40 s of free motion after each.",
-    120,
-    3,
+    " without switching off, switch off and on without taking it off; 20 s of free motion after each. All of"
+    " it three times: how often a cause changed counts, not how long it was seen.",
+    180,
+    9,
 )
 TAPS = Motion(
     "taps",
