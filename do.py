@@ -30,8 +30,8 @@
                             study camera: a camera as the reference against true angles
                             (a quarter of an hour);
                             study camera-errors: what the colour glove's tracker errs by (an hour;
-                            --sizes: the same scene at 640 to 3840 pixels, half an hour);
-                            study camera-applications: the examples driven by a camera's poses (an hour);
+                            --sizes: the same scene at 640 to 3840 pixels);
+                            study camera-applications: the examples driven by a camera's poses;
                             study faults: kills, cuts, full disks at random: is anything lost? (two minutes;
                             --faults N, --seed S, --minutes N; --table lists what is tried)
     python3 do.py fresh     demo and test on bare Debian systems, as a table (hours; needs root, debootstrap;

@@ -89,10 +89,7 @@ def fit_with_effects(
     found: list[Mapping[str, LmcOptimum]] = []
 
     def trained() -> None:
-        known = dict(optima[min(len(found), len(optima) - 1)]) if optima else {}
-        if found:  # the turn before is nearer than what was found in more takes
-            near = {name: found[-1].get(name, each).parameters for name, each in known.items()}
-            known = {name: each._replace(parameters=near[name]) for name, each in known.items()}
+        known = optima[min(len(found), len(optima) - 1)] if optima else {}
         moved = [name for name in rotations if not found or name in corrected]
         tasks = []
         for name in moved:

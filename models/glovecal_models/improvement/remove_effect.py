@@ -12,12 +12,7 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, columnless_effects
-from glovecal_models.calibration.effect_fit import (
-    EffectFit,
-    correspondence_for,
-    fit_with_effects,
-    optima_of,
-)
+from glovecal_models.calibration.effect_fit import EffectFit, correspondence_for, fit_with_effects
 from glovecal_models.calibration.learned_lead import with_leads
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors, left_out_wearings
 from glovecal_models.calibration.model import CalibrationModel, RotationModel
@@ -166,9 +161,8 @@ def errors_if_redundant(
     )
     most_square = frames * most_deg**2
     without = held_out_errors(
-        prepared, tuple(now.square), wanted, settings, optima=optima_of(model), most_square=most_square,
-        cancelled=cancelled,
-    )  # fmt: skip
+        prepared, tuple(now.square), wanted, settings, most_square=most_square, cancelled=cancelled
+    )
     is_redundant = sum(without.square.values()) <= most_square and without.overall_deg <= most_deg
     return without if is_redundant else None
 

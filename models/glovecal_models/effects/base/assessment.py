@@ -16,6 +16,7 @@ from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, Significanc
 BLOCK_ROWS = 125
 """5 s of the rows that are fitted."""
 MOST_EXACT_RANKS = 25
+"""Values up to which signed ranks have their exact p value."""
 
 
 def saved_share(before: np.ndarray, after: np.ndarray) -> float:
@@ -66,7 +67,8 @@ class JointErrors:
     @property
     def saved_in_takes(self) -> np.ndarray:
         """(T,): ``beyond_control``, summed over the blocks of each take."""
-        return np.array([self.beyond_control[self.take == take].sum() for take in np.unique(self.take)])
+        saved = self.beyond_control
+        return np.array([saved[self.take == take].sum() for take in np.unique(self.take)])
 
     @property
     def beyond_control(self) -> np.ndarray:
@@ -165,9 +167,10 @@ class Assessment:
 
     def _is_alone_beyond_chance(self, errors: JointErrors, p_value: float) -> bool:
         """Whether one joint shows it without the others: in its takes too, the blocks of one go together."""
-        limits, takes = self.limits, errors.saved_in_takes
+        limits = self.limits
         if errors.contrast < limits.alone_share:
             return False
+        takes = errors.saved_in_takes
         is_faint = len(takes) >= limits.few_takes and errors.contrast < limits.clear_share
         in_takes = signed_rank(takes) if is_faint else 0.0
         return in_takes <= limits.alone_takes_p_value and self._is_beyond_chance(errors, p_value)

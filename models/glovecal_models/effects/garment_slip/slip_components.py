@@ -27,7 +27,7 @@ LIKELIER, FEW_JOINTS = 4.0, 5
 """Twice the log likelihood ratio from which on one joint alone slips; more with more joints, each a chance to
 err."""
 LARGE_DEG = 0.55
-"""And at least one joint has to slip by more: of 310 simulated clean gloves that wander by 0.4 degrees eleven
+"""And at least one joint has to slip by more: of 310 simulated clean gloves that wander by 0.4 degrees ten
 have a ratio above 4, up to 14, all of 0.54 degrees at most; of 14 that slip by 0.65 noise floors and are that
 likely twelve slip by more, of twelve that slip by 1.3 eleven (2026-11-28)."""
 TOGETHER_LIKELIER, EACH_LIKELIER, SOME_LIKELIER = 8.0, 0.7, 2.0
