@@ -45,7 +45,8 @@ class SignificanceLimits:
         "An effect that shows on one joint alone, not on all together, must save so much of its error beyond"
         " its control.",
         "Of 460 healthy simulated gloves of 12 takes (2026-11-28) three had a hysteresis named that saved"
-        " 0.05 to 0.06 of one joint; what is there at 0.65 noise floors shows on all joints together, or saves 0.2 of one.",
+        " 0.05 to 0.06 of one joint; what is there at 0.65 noise floors shows on all joints together, or"
+        " saves 0.2 of one.",
     )
     alone_takes_p_value: float = limit(
         0.05,
