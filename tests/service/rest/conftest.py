@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import uvicorn
 from anyio.from_thread import start_blocking_portal
+from fastapi import FastAPI
 
 from glovecal_client.rest import RestClient
 from glovecal_service.rest.app import create_app
@@ -59,10 +60,14 @@ def serve() -> Iterator[Callable[..., str]]:
     """Starts real uvicorn servers on free loopback ports; gives their addresses."""
     running: list[tuple[uvicorn.Server, threading.Thread]] = []
 
-    def start(settings: Settings, *, body_patience_s: float = 30.0) -> str:
+    def start(
+        settings: Settings, *, body_patience_s: float = 30.0, more: Callable[[FastAPI], None] | None = None
+    ) -> str:
         listener = socket.create_server(("127.0.0.1", 0))
         port = listener.getsockname()[1]
         app = create_app(settings, body_patience_s=body_patience_s)
+        if more is not None:
+            more(app)
         server = uvicorn.Server(server_config(app, "127.0.0.1", port, proxies=settings.known_proxies))
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()

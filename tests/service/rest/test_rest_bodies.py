@@ -14,6 +14,9 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from fastapi import WebSocket
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from glovecal_service.settings import Settings
 
@@ -129,6 +132,21 @@ def test_slow_bodies_and_headers_are_ended(
     assert list((tmp_path / "data" / "uploads").iterdir()) == []
     assert _exchange(url, b"GET /v1/health/live HTTP/1.1\r\nHost: local") == b""
     assert httpx.get(f"{url}/v1/health/live", trust_env=False).status_code == 200
+
+
+def test_a_websocket_outlasts_the_time_for_headers(
+    serve: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def echo(line: WebSocket) -> None:
+        await line.accept()
+        await line.send_text(await line.receive_text())
+
+    monkeypatch.setattr("glovecal_service.rest.http.server.PatientH11Protocol.header_deadline_s", 0.6)
+    url = serve(Settings(data=tmp_path / "data"), more=lambda app: app.add_api_websocket_route("/echo", echo))
+    with connect(f"ws{url.removeprefix('http')}/echo", origin=Origin(url), proxy=None) as line:
+        assert _exchange(url, b"GET /v1/health/live HTTP/1.1\r\nHost: local") == b"", "begun later, and ended"
+        line.send("still there")
+        assert line.recv(120) == "still there"
 
 
 def test_many_slow_connections_do_not_keep_others_out(serve: Callable[..., str], tmp_path: Path) -> None:

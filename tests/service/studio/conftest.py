@@ -5,13 +5,14 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 import httpx
 import pytest
 from playwright.sync_api import Browser, ViewportSize
+from playwright.sync_api import Error as PlaywrightError
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -26,6 +27,10 @@ from glovecal_service.store import Store
 DESKTOP: ViewportSize = {"width": 1280, "height": 800}
 TABLET: ViewportSize = {"width": 768, "height": 1024}
 HARMLESS = "GPU stall due to ReadPixels"
+TELL_OF_THE_LINE = """window.socket && {
+  connected: socket.connected, by: socket.io.engine?.transport?.name, unsent: socket.sendBuffer.length,
+  next: nextMessageId, known: did_handshake,
+}"""
 
 
 @pytest.fixture(scope="package")
@@ -83,20 +88,23 @@ def _nothing_left_behind() -> Iterator[None]:
 @pytest.fixture
 def opened(browser: Browser, address: str) -> Iterator[Open]:
     """``opened("live")``: the page once its heading is there; ``at`` is another service's address. On a
-    ``tablet`` there is no mouse, and it is held upright."""
+    ``tablet`` there is no mouse, and it is held upright. Nothing moves by itself: what moves is half of the
+    drawing, and what unfolds can be clicked a moment before it stands still. A failed test shows what the
+    browser logged and how its line to the service stood."""
     contexts = []
 
     def open_page(name: str, at: str = address, *, tablet: bool = False) -> Opened:
         # A quarter of the pixels each way: the processor draws them all.
         context = browser.new_context(
             viewport=TABLET if tablet else DESKTOP, has_touch=tablet, is_mobile=tablet,
-            device_scale_factor=0.25, color_scheme="light",
+            device_scale_factor=0.25, color_scheme="light", reduced_motion="reduce",
         )  # fmt: skip
         context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)
         seen = Opened(context.new_page())
 
         def complain(message: Any) -> None:
+            print("browser:", message.type, message.text)
             if message.type == "error" and HARMLESS not in message.text:
                 seen.complaints.append(message.text)
 
@@ -107,8 +115,12 @@ def opened(browser: Browser, address: str) -> Iterator[Open]:
         seen.page.wait_for_selector("h1")
         # what is clicked before is lost: the service does not know the page yet
         seen.page.wait_for_function("!window.socket || window.did_handshake === true")
+        seen.page.evaluate(TELL_OF_THE_LINE)
         return seen
 
     yield open_page
     for context in contexts:
+        for page in context.pages:
+            with suppress(PlaywrightError):  # a page that was left or crashed
+                print("line to the service:", page.url, page.evaluate("window.socket && socket.connected"))
         context.close()

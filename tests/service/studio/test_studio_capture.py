@@ -131,7 +131,6 @@ def test_a_sampling_by_keyboard_alone_through_a_redo_a_reload_and_another_tab(
 ) -> None:
     seen = opened("capture")
     page = seen.page
-    page.emulate_media(reduced_motion="reduce")  # drawn by software, a moving hand is half of the time
     page.get_by_role("button", name="Start sampling").wait_for()
     tab_to(page, "Protocol")
     page.keyboard.press("ArrowDown")
@@ -253,7 +252,6 @@ def choose(page: Page, label: str, option: str) -> None:
 def test_the_active_protocol_goes_on_by_a_still_hand(opened: Open, address: str) -> None:
     seen = opened("capture")
     page = seen.page
-    page.emulate_media(reduced_motion="reduce")
     page.get_by_role("button", name="Start sampling").wait_for()
     choose(page, "Protocol", "Active")
     choose(page, "A step starts", "By holding the hand still")
@@ -271,7 +269,6 @@ def test_the_active_protocol_goes_on_by_a_still_hand(opened: Open, address: str)
 def test_five_hand_shapes_end_with_a_template_that_is_not_live_unasked(opened: Open, address: str) -> None:
     seen = opened("capture")
     page = seen.page
-    page.emulate_media(reduced_motion="reduce")
     page.get_by_role("button", name="Start sampling").wait_for()
     choose(page, "Protocol", "Five hand shapes")
     choose(page, "A step starts", "By timer: steps")
@@ -291,7 +288,6 @@ def test_five_hand_shapes_end_with_a_template_that_is_not_live_unasked(opened: O
 def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Open, address: str) -> None:
     seen = opened("capture")
     page = seen.page
-    page.emulate_media(reduced_motion="reduce")
     page.get_by_role("button", name="Start sampling").wait_for()
     choose(page, "Protocol", "Poses and widgets only")
     choose(page, "A step starts", "By timer: steps")
@@ -305,7 +301,6 @@ def test_from_a_first_sampling_by_timer_to_a_checked_wearing_by_pedal(opened: Op
     assert [each["active"] for each in asked(address, "models", subject=SUBJECT)] == [True]
 
     page = opened("capture?mode=wearing").page
-    page.emulate_media(reduced_motion="reduce")
     page.get_by_label("Name of this wearing").fill("in the afternoon")
     began = time.monotonic()
     page.get_by_role("button", name="Start the check").click()
@@ -328,7 +323,6 @@ def test_a_lost_glove_is_told(opened: Open, address: str, worn: subprocess.Popen
     body = {"glove": GLOVE, "subject": SUBJECT, "protocol": "fk_only"}
     id = httpx.post(f"{address}/v1/sampling", json=body).raise_for_status().json()["id"]
     page = opened("capture").page
-    page.emulate_media(reduced_motion="reduce")
     in_phase(page, "waiting")
     worn.terminate()
     in_phase(page, "lost")

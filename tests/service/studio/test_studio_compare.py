@@ -157,6 +157,7 @@ def test_a_bad_stretch_is_replayed_on_the_hand_beside_its_ghost(
     [other] = {"I_MCP", "I_PIP"} - {rotation}
     seen = filled(opened, f"compare?models={model}&takes={','.join(takes)}&rotation={other}")
     page = seen.page
+    page.emulate_media(reduced_motion="no-preference")  # a replay begins by itself
     shown = page.locator(".stretch")
     expect(shown).to_have_count(len(stretches))
     expect(shown.nth(chosen)).to_contain_text(f"{rotation} {stretch['rotation_rmse_deg']:.2f}°")

@@ -63,7 +63,9 @@ class PatientH11Protocol(H11Protocol):
         super().connection_lost(exc)
 
     def _waits_for_headers(self) -> bool:
-        return self.cycle is None or self.cycle.response_complete
+        """Not where the connection has become a WebSocket, which is another protocol's from then on."""
+        is_ours = self.transport.get_protocol() is self
+        return is_ours and (self.cycle is None or self.cycle.response_complete)
 
     def _give_up(self) -> None:
         self._deadline = None

@@ -15,6 +15,7 @@ from glovecal_service.studio.studio import Studio
 
 CONTENTS = {"joints": "Places of joints", "angles": "Angles of joints", "raw": "Readings as they came"}
 LIMIT_S = 1800
+NEEDS_ANGLES = "This format needs angles: train a model on this person's takes first."
 SAVE = """
 const answer = await fetch("../v1/motion", {
   method: "POST", headers: {"Content-Type": "application/json"}, body: JSON.stringify(BODY),
@@ -88,7 +89,7 @@ class TakeExport:
             f"Read by {chosen.read_by}."
         )
         if not options:
-            self._told.set_text("This format needs angles: train a model on this person's takes first.")
+            self._told.set_text(NEEDS_ANGLES)
 
     def _tell(self, sentence: str) -> None:
         self._told.set_text(sentence)
@@ -111,6 +112,7 @@ class TakeExport:
 
     async def _write(self) -> None:
         if self._content.value is None:
+            self._told.set_text(NEEDS_ANGLES)
             return
         body = self._body() | self._onto.asked
         name = f"{self._own.name}.{self._format.value}"
