@@ -327,6 +327,6 @@ def test_a_lost_glove_is_told(opened: Open, address: str, worn: subprocess.Popen
     worn.terminate()
     in_phase(page, "lost")
     expect(page.locator(".board-line")).to_contain_text("Waiting for the glove")
-    expect(page.locator(".capture-head .state-word")).to_have_text("lost")
+    expect(page.locator(".capture-head .state-word")).to_contain_text("lost")
     httpx.post(f"{address}/v1/sampling/{id}/stop", json={}).raise_for_status()
     page.get_by_role("heading", name="Stopped").wait_for()

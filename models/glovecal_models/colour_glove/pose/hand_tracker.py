@@ -414,11 +414,13 @@ _ELSEWHERE = {1: 1.45, 2: 1.27}
 """By how much hands that another program drew (tests/simulated/lit_glove.py, seeds 500 to 507) erred more
 than those that errors are learned on: RMS of accepted errors over their deviations, by cameras."""
 _ELSEWHERE_FITTED = {
-    1: {"TMC": 1.0, "ABD": 1.05, "VIR": 1.0, "MCP": 1.3, "PIP": 1.15, "DIP": 1.0, "IP": 2.5},
+    1: {"TMC": 1.0, "ABD": 1.05, "VIR": 1.0, "MCP": 1.75, "PIP": 1.4, "DIP": 1.0, "IP": 2.5},
     2: {"TMC": 0.9, "ABD": 0.9, "VIR": 1.0, "MCP": 1.15, "PIP": 1.05, "DIP": 0.9, "IP": 2.0},
 }
 """The same where the hand's shape was fitted, by the kind of joint: what 95 % of errors ask for. The thumb's
-last joint is far worse on hands that are not the model's, others a little or not at all."""
+last joint is far worse on hands that are not the model's, others a little or not at all. One camera was
+too sure of bends: of what it accepted of 16 further hands (9400 to 9407, 9500 to 9507) 81 % of knuckles and
+88 % of middle joints were within their interval."""
 _MIRRORED = np.array([1.0] * 20 + [1.0, -1.0, -1.0] + [-1.0, 1.0, 1.0])
 """Of a step, seen in a mirror beside the hand: turns about y and z, and the place along x, change signs."""
 
