@@ -27,10 +27,8 @@ from glovecal_service.store import Store
 DESKTOP: ViewportSize = {"width": 1280, "height": 800}
 TABLET: ViewportSize = {"width": 768, "height": 1024}
 HARMLESS = "GPU stall due to ReadPixels"
-TELL_OF_THE_LINE = """window.socket && {
-  connected: socket.connected, by: socket.io.engine?.transport?.name, unsent: socket.sendBuffer.length,
-  next: nextMessageId, known: did_handshake,
-}"""
+TELL_OF_THE_LINE = """window.socket && ["connect", "disconnect", "connect_error"].forEach(
+  name => socket.on(name, about => console.info("line to the service:", name, String(about))))"""
 
 
 @pytest.fixture(scope="package")
