@@ -10,7 +10,9 @@ import inspect
 import logging
 import os
 import re
+import shutil
 import signal
+import subprocess
 import sys
 import sysconfig
 import threading
@@ -54,6 +56,11 @@ HOME = Path(__file__).resolve().parents[1] / ".pytest_cache" / "home"
 MASK = 0o022
 OURS = {"tests", "docs", "pytest", "_pytest"}
 """pytest warns of what tests leave behind."""
+COMPILERS = {
+    ".cpp": (("c++", "g++", "clang++"), ("-std=c++17", "-Wall", "-Wextra", "-Werror"), "g++"),
+    ".rs": (("rustc",), ("--edition", "2021", "-D", "warnings"), "rustc"),
+}
+"""Of a source, by its ending: commands, options, Debian's package."""
 OUTSIDE = pytest.StashKey[dict[str, str]]()
 
 
@@ -192,3 +199,25 @@ def missing(sentence: str) -> NoReturn:
     if os.environ.get(REQUIRE_EVERYTHING) == "1":
         pytest.fail(sentence)
     pytest.skip(sentence)
+
+
+@pytest.fixture(scope="session")
+def compiled(tmp_path_factory: pytest.TempPathFactory, outside: Mapping[str, str]) -> Callable[[Path], Path]:
+    """The program of a source in another language; where no compiler of it runs, what ``missing`` does."""
+
+    def program(source: Path) -> Path:
+        commands, options, package = COMPILERS[source.suffix]
+        found = (path for path in map(shutil.which, commands) if path)
+        compiler = next((path for path in found if _runs(path, outside)), None)
+        if compiler is None:
+            missing(f"no compiler of {source.name} runs here (Debian: apt-get install {package})")
+        made = tmp_path_factory.mktemp("compiled") / source.name.replace(".", "-")
+        subprocess.run([compiler, *options, "-o", str(made), str(source)], check=True, env=dict(outside))
+        return made
+
+    return program
+
+
+def _runs(compiler: str, environment: Mapping[str, str]) -> bool:
+    """What rustup puts on the path does nothing without a toolchain in the user's home."""
+    return subprocess.run([compiler, "--version"], capture_output=True, env=dict(environment)).returncode == 0

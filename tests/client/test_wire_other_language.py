@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
 
 import pytest
 
@@ -16,40 +13,9 @@ GOLDEN = Path(__file__).parent / "golden"
 MESSAGES = ("frame_v1", "pose_v1", "pose_v1_faulty", "pose_v1_settling")
 
 
-@dataclass(frozen=True)
-class Language:
-    source: str
-    compilers: tuple[str, ...]
-    options: tuple[str, ...]
-    remedy: str
-
-
-LANGUAGES = {
-    "C++": Language(
-        "read_messages.cpp", ("c++", "g++", "clang++"), ("-std=c++17", "-Wall", "-Wextra", "-Werror"),
-        "apt-get install g++",
-    ),
-    "Rust": Language(
-        "read_messages.rs", ("rustc",), ("--edition", "2021", "-D", "warnings"), "apt-get install rustc"
-    ),
-}  # fmt: skip
-
-
-@pytest.fixture(scope="module", params=LANGUAGES)
-def reader(
-    request: pytest.FixtureRequest,
-    tmp_path_factory: pytest.TempPathFactory,
-    not_here: Callable[[str], NoReturn],
-    outside: Mapping[str, str],
-) -> Path:
-    language = LANGUAGES[request.param]
-    compiler = next(filter(None, map(shutil.which, language.compilers)), None)
-    if compiler is None:
-        not_here(f"there is no {request.param} compiler (Debian: {language.remedy})")
-    program = tmp_path_factory.mktemp("reader") / "read_messages"
-    command = [compiler, *language.options, "-o", str(program), str(GOLDEN / language.source)]
-    subprocess.run(command, check=True, env=dict(outside))
-    return program
+@pytest.fixture(scope="module", params=["read_messages.cpp", "read_messages.rs"])
+def reader(request: pytest.FixtureRequest, compiled: Callable[[Path], Path]) -> Path:
+    return compiled(GOLDEN / request.param)
 
 
 @pytest.mark.parametrize("name", MESSAGES)

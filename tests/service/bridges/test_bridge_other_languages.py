@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 import pytest
 from bridge_support import FIST, Stage, running_bridge
@@ -15,27 +13,11 @@ from bridge_support import FIST, Stage, running_bridge
 from glovecal_client.wire.pose import RotationFlag
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "client" / "examples"
-LANGUAGES = {
-    "cpp": (("c++", "g++", "clang++"), ("-std=c++17", "-Wall", "-Wextra", "-Werror"), "g++"),
-    "rs": (("rustc",), ("--edition", "2021", "-D", "warnings"), "rustc"),
-}
 
 
-@pytest.fixture(scope="module", params=LANGUAGES)
-def program(
-    request: pytest.FixtureRequest,
-    tmp_path_factory: pytest.TempPathFactory,
-    not_here: Callable[[str], NoReturn],
-    outside: Mapping[str, str],
-) -> Path:
-    names, options, package = LANGUAGES[request.param]
-    compiler = next(filter(None, map(shutil.which, names)), None)
-    if compiler is None:
-        not_here(f"there is no compiler for .{request.param} (Debian: apt-get install {package})")
-    program = tmp_path_factory.mktemp("subscriber") / f"subscribe-{request.param}"
-    source = EXAMPLES / f"subscribe.{request.param}"
-    subprocess.run([compiler, *options, "-o", str(program), str(source)], check=True, env=dict(outside))
-    return program
+@pytest.fixture(scope="module", params=["subscribe.cpp", "subscribe.rs"])
+def program(request: pytest.FixtureRequest, compiled: Callable[[Path], Path]) -> Path:
+    return compiled(EXAMPLES / request.param)
 
 
 @contextmanager
