@@ -29,6 +29,15 @@ def test_columns_of_zeros_change_nothing(units):
     assert found.added == pytest.approx(found.base)
 
 
+def test_columns_of_an_effect_in_the_base_may_be_zero(units):
+    """As those of a wearing that is in none of the takes that are kept."""
+    prior_sd = np.array([np.inf, np.inf, np.inf, 2.0])
+    wider = [Rows(np.column_stack([unit.base, np.zeros(80)]), unit.target) for unit in units]
+    found = BaseProducts(wider, prior_sd, own=3)
+    assert found.whole == pytest.approx([*BaseProducts(units).whole, 0.0])
+    assert np.concatenate(found.residual) == pytest.approx(np.concatenate(BaseProducts(units).residual))
+
+
 def test_every_fold_is_the_ridge_fit_of_the_others(units):
     random = np.random.default_rng(4)
     columns = [random.normal(size=(80, 1, 2)) for _ in units]
