@@ -13,6 +13,9 @@ from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import stored_correction
 from glovecal_models.effects.sensor_fault.sensor_fault import SensorFault
 from glovecal_models.layout import Layout
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import SessionPlan
 
 FAULT = SensorFault()
 
@@ -200,6 +203,14 @@ def test_gains_that_a_wearing_or_a_column_explains_are_no_fault(glove, gains):
         for take, volt in zip(takes, volts, strict=True)
     ]
     assert FAULT.find(takes, glove.sensor_of) == ()
+
+
+def test_a_late_glove_that_is_swung_fast_has_no_fault():
+    plan = SessionPlan(
+        seed=2, wearings=1, takes_per_wearing=11, take_s=20.0, motions=("natural",) * 8 + ("fast",) * 3
+    )
+    session = record_session(plan, (Cause("glove_latency", strength_deg=2.5),))
+    assert FAULT.find(session.takes, {name: name for name in plan.sensors}) == ()
 
 
 def with_sensor(glove, change, rotation=0, **choices):

@@ -3,8 +3,8 @@
 It may be too small, or too near the end of a take, to be seen as a jump. The slopes of the takes show it: of
 what the reading has beyond its usual curve, against the angle. A glove that slips changes offsets, and no
 slopes. One change for good must explain the slopes beyond chance, and still do so beside the wearings, a
-steady drift and any recorded column. A change just where the glove was put on again may as well be of the
-donning: it is not named.
+steady drift, any recorded column and how fast the joint moved, as a sensor that is late answers less to fast
+swings. A change just where the glove was put on again may as well be of the donning: it is not named.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ INSIDE_P_VALUE = 0.05
 LEAST_SHARE = 0.02
 """Of the usual slope: less is within what a curve through a whole session leaves. A film that cracked in
 simulated gloves changed it by 3 percent, a supply whose sag the base had not yet, by 1."""
+SPEED_OVER_S = 0.1
+"""Longer than the noise of a reference, shorter than a swing."""
 BESIDE_P_VALUE = 0.005
 """That the change explains by chance so much of what the wearings, or a column, leave."""
 
@@ -77,8 +79,8 @@ def gain_change(
     p_value = min(1.0, chance * len(moments) * sensors)
     if p_value > CHANGE_P_VALUE or abs(best.second) < LEAST_SHARE:
         return None
-    change = _changed(len(used), before, after)
-    for rival in _rivals([takes[n] for n in used]):
+    change, speeds = _changed(len(used), before, after), [_speed(takes[n].time_s, angles[n]) for n in used]
+    for rival in _rivals([takes[n] for n in used], np.array(speeds)):
         # The take that holds the change, if any, speaks for neither.
         without = slopes.fitted(np.column_stack([rival, change[:, 2:]]))
         beside = slopes.fitted(np.column_stack([rival, change[:, 1:]]))
@@ -175,18 +177,31 @@ def _changed(takes: int, before: int, after: int) -> np.ndarray:
     return np.column_stack(columns).astype(float)
 
 
-def _rivals(takes: Sequence[Take]) -> Iterator[np.ndarray]:
-    """(T, K) of each cause that may change slopes too: the wearings, a steady drift, and columns that all
-    takes know."""
+def _rivals(takes: Sequence[Take], speeds: np.ndarray) -> Iterator[np.ndarray]:
+    """(T, K) of each cause that may change slopes too: the wearings, a steady drift, the ``speeds`` (T,), and
+    columns that all takes know."""
     wearings = np.array([take.wearing for take in takes])
     yield np.column_stack([wearings == name for name in dict.fromkeys(wearings.tolist())]).astype(float)
     yield np.vander(np.arange(len(takes)) / len(takes), 2)
+    yield _curve(speeds)
     for name in sorted(set.intersection(*(set(take.context) for take in takes))):
         values = [take.context[name][np.isfinite(take.context[name])] for take in takes]
         if all(map(len, values)):
-            level = np.array([part.mean() for part in values])
-            unit = max(float(level.std()), 1e-12)
-            yield np.vander((level - level.mean()) / unit, 3)
+            yield _curve(np.array([part.mean() for part in values]))
+
+
+def _curve(levels: np.ndarray) -> np.ndarray:
+    """(T, 3) of T numbers."""
+    return np.vander((levels - levels.mean()) / max(float(levels.std()), 1e-12), 3)
+
+
+def _speed(time_s: np.ndarray, angle: np.ndarray) -> float:
+    """The mean square of a joint's angular frequency (1/s²): by so much, times half its square, a delay
+    lessens the slope. ``angle`` (N,) has at least one spread."""
+    step = max(round(SPEED_OVER_S / float(np.median(np.diff(time_s)))), 1)
+    changes = (angle[step:] - angle[:-step]) / (time_s[step:] - time_s[:-step])
+    changes = changes[np.isfinite(changes)]
+    return float(np.mean(changes**2) / np.nanvar(angle)) if len(changes) else 0.0
 
 
 # A jump of gain or offset in the middle of a take: a plug that moved, an amplifier that switched. The
