@@ -19,17 +19,14 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.session import RecordedSession, record_session
 from glovecal_models.simulation.session_plan import (
     FIVE_SENSORS,
-    FULL_BATTERY_V,
     SessionPlan,
     TakeMotion,
-    one_more,
+    TakeStart,
 )
 from glovecal_models.takes.take import Take
 
 PALM_SENSORS = ("I_MCP", "M_MCP", "R_MCP", "P_MCP", "P_PIP", "T_TMC", "PALM_ARCH")
 """Six joints, and the sensor without which no palm arch can be seen; the thumb, as its opposition enters."""
-BETWEEN_S = 60.0
-"""From the end of a take to the next, while one thing is changed."""
 BYSTANDER_DEG = 1e-3
 """A recorded column whose cause is this small explains nothing."""
 
@@ -120,33 +117,9 @@ class BlindGlove:
         """One more take after the session, as ``RecordedSession.also``, of the same glove and reference."""
         return self._wandering(self.session.also(motion, take_s, wearing, repeat=repeat).take)
 
-    def crossed(self, take_s: float, repeat: int) -> list[Take]:
-        """Free motion after each of three changes, one at a time: a fresh battery without switching off, the
-        glove off and on without switching off, switched off and on without taking it off."""
-        plan, last, new = self.session.plan, self.wearings - 1, self.wearings + repeat
-        random = np.random.default_rng([self.seed, 43, repeat])
-        fresh_v, powered_s = random.uniform(*FULL_BATTERY_V), random.uniform(4.0, 70.0)
-        [battery] = one_more(plan, "natural", take_s, last, 2 * repeat)
-        [donned] = one_more(plan, "natural", take_s, new, 0)
-        [switched] = one_more(plan, "natural", take_s, new, 1)
-        later_s = take_s + BETWEEN_S
-        starts = (
-            replace(battery, supply_v=fresh_v),
-            replace(
-                donned,
-                supply_v=fresh_v,
-                session_s=battery.session_s + later_s,
-                power_on_s=battery.power_on_s + later_s,
-            ),
-            replace(
-                switched,
-                supply_v=fresh_v,
-                session_s=battery.session_s + 2 * later_s,
-                power_on_s=powered_s,
-                since_donned_s=donned.since_donned_s + later_s,
-            ),
-        )
-        return [self._wandering(self.session.at(start).take) for start in starts]
+    def at(self, start: TakeStart) -> Take:
+        """One more take in circumstances of its own, as ``RecordedSession.at``."""
+        return self._wandering(self.session.at(start).take)
 
     @property
     def duration_s(self) -> float:

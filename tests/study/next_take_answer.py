@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, cast, get_args
+from typing import Any
 
 import numpy as np
 from blind_glove import BlindGlove
+from further_forms import every_form
+from further_takes import FurtherTakes
 
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.diagnosis.diagnosis import Diagnosis
-from glovecal_models.diagnosis.residual_answer import NextTake
-from glovecal_models.effects.base.relations import CROSSED, TAPS
+from glovecal_models.effects.base.relations import TAPS
 from glovecal_models.improvement.limits import IMPROVEMENT_LIMITS, ImprovementLimits
-from glovecal_models.simulation.session_plan import TakeMotion
+from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.signals import at_times
-from glovecal_models.takes.take import KnownLatency, Take
+from glovecal_models.takes.take import KnownLatency
 from glovecal_models.takes.tap_latency import USUAL_KEY_S, usual_key
 
 MOST_TAKES = 2
-NEW_WEARING_S = 40.0
+MOST_BITS = 16
 DELAYS_S = np.arange(0.0, 0.1, 0.001)
 """That frames which come again are tried for."""
 TAPS_SD_S = 0.003
@@ -30,7 +31,7 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
     """Confidence sets before and after each recorded take, and the motions that were asked for."""
     takes, random = list(glove.takes), np.random.default_rng(glove.seed)
     found = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
-    sets, motions = [_told(found)], []
+    sets, motions, further = [_told(found)], [], FurtherTakes(glove)
     while len(motions) < MOST_TAKES and len(sets[-1]) > 1 and _decides(found):
         assert found.next_take is not None
         motions.append(found.next_take.motion)
@@ -38,7 +39,7 @@ def next_take_answer(glove: BlindGlove, limits: ImprovementLimits = IMPROVEMENT_
             tapped = _tapped(glove, random)
             takes = [replace(take, glove_latency=tapped) for take in takes]
         else:
-            takes.extend(_recorded(glove, found.next_take, len(motions) - 1))
+            takes.extend(further.recorded(found.next_take))
         found: Diagnosis = diagnose(takes, glove.layout, linear=glove.linear, limits=limits.diagnosis)
         sets.append(_told(found))
     return {"confidence_sets": sets, "motions": motions}
@@ -62,9 +63,12 @@ def _tapped(glove: BlindGlove, random: np.random.Generator) -> KnownLatency:
 
 
 def _late_s(glove: BlindGlove) -> float:
-    """By which delay the clean twin's readings, noise included, come nearest to the glove's: of a glove whose
-    forms of delay have other parameters than seconds, and of one that sends old readings again."""
-    pairs = list(zip(glove.takes, glove.clean_takes, strict=True))
+    """By which delay the clean twin's readings come nearest to the glove's: of a glove whose forms of delay
+    have other parameters than seconds, and of one that sends old readings again. Without noise, which comes
+    after the delay: it would be the same without any."""
+    quiet = replace(glove.plan, sensor_noise_deg=0.0, bits=MOST_BITS)
+    session = record_session(quiet, glove.causes, forms_of=every_form)
+    pairs = list(zip(session.takes, session.clean, strict=True))
     left = [
         sum(
             float(np.mean((take.readings - at_times(take.time_s, clean.readings, take.time_s - delay)) ** 2))
@@ -73,14 +77,3 @@ def _late_s(glove: BlindGlove) -> float:
         for delay in DELAYS_S
     ]
     return float(DELAYS_S[int(np.argmin(left))])
-
-
-def _recorded(glove: BlindGlove, asked: NextTake, repeat: int) -> list[Take]:
-    """The wearer does as told; whatever is no motion is a new wearing in free motion."""
-    if asked.motion in get_args(TakeMotion):
-        motion = cast(TakeMotion, asked.motion)
-        return [glove.also(motion, float(asked.seconds), glove.wearings - 1, repeat=repeat)]
-    if asked.motion == CROSSED.name:
-        rounds, each_s = CROSSED.takes // 3, CROSSED.seconds / CROSSED.takes
-        return [take for turn in range(rounds) for take in glove.crossed(each_s, rounds * repeat + turn)]
-    return [glove.also("natural", NEW_WEARING_S, glove.wearings + repeat)]

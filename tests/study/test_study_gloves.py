@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 from blind_glove import BlindGlove, Nuisance
 from further_forms import dealt_forms
+from further_takes import FurtherTakes
 from glove_choices import (
     BITS,
     EVERY_RATE_HZ,
@@ -24,6 +25,8 @@ from glove_choices import (
 from study_parts import LEAD_S, PARTS, QUICK, REMEMBERING, StudyChoices
 from wandering_reference import WANDER_DEG
 
+from glovecal_models.diagnosis.residual_answer import NextTake
+from glovecal_models.effects.base.relations import AIR, CROSSED
 from glovecal_models.simulation.causes.catalogue import KNOWN_CAUSES
 
 FEW = StudyChoices(gloves=3, clean=6, repairs=2, pairs=6, second_names=36, ceilings=48, recorded=44)
@@ -123,6 +126,46 @@ def test_a_wandering_reference_is_slow_and_the_same_for_the_twin() -> None:
     assert wandering.floor_deg == pytest.approx(np.hypot(steady.floor_deg, WANDER_DEG))
     later = wandering.also("natural", 20.0, 0).reference - steady.also("natural", 20.0, 0).reference
     assert np.sqrt(np.mean(later**2, axis=0)) == pytest.approx(WANDER_DEG)
+
+
+def test_in_other_air_temperature_and_humidity_go_different_ways() -> None:
+    glove = short("white")
+    further = FurtherTakes(glove)
+    takes = further.recorded(NextTake(AIR.name, AIR.what, 48, (), "air", 6))
+    [last] = {take.wearing for take in takes}
+    assert last == glove.takes[-1].wearing
+    warm, damp = (
+        np.array([take.context[name].mean() for take in takes]) for name in ("temperature_c", "humidity_pct")
+    )
+    cool, bag, heated = warm.reshape(2, 3).T
+    assert (cool < bag).all()
+    assert (bag < heated).all()
+    cool, bag, heated = damp.reshape(2, 3).T
+    assert (heated < cool).all(), "warmed air is drier"
+    assert (heated < bag).all()
+    begun = [float(take.context["power_on_s"][0]) for take in (glove.takes[-1], *takes)]
+    assert begun == sorted(begun)
+
+
+def test_what_is_changed_one_at_a_time_is_changed_alone_and_goes_on() -> None:
+    glove = short("white")
+    further = FurtherTakes(glove)
+    crossed = NextTake(CROSSED.name, CROSSED.what, 48, (), "crossed", 6)
+    takes = [glove.takes[-1], *further.recorded(crossed), *further.recorded(crossed)]
+    wearings = [take.wearing for take in takes]
+    volts, power_s = (np.array([t.context[name][0] for t in takes]) for name in ("supply_v", "power_on_s"))
+    changes = {
+        "battery": np.abs(np.diff(volts)) > 0.1,
+        "wearing": np.array([one != next_ for one, next_ in pairwise(wearings)]),
+        "power": np.diff(power_s) < 0,
+    }
+    for name, place in (("battery", 0), ("wearing", 1), ("power", 2)):
+        others = np.delete(np.arange(12), np.arange(place, 12, 3))
+        assert not changes[name][others].any()
+    assert changes["wearing"][1::3].all()
+    assert changes["power"][2::3].all()
+    assert changes["battery"][0::3].sum() >= 3
+    assert len(set(wearings)) == 5, "no wearing comes back"
 
 
 def test_takes_have_the_frame_rate_of_the_glove() -> None:

@@ -42,7 +42,7 @@ from glovecal_models.diagnosis.signatures import (
     may_explain,
     own_sensors,
     signature_findings,
-    static_errors,
+    weighed,
 )
 from glovecal_models.diagnosis.state import State
 from glovecal_models.diagnosis.unexplained_residual import (
@@ -54,7 +54,12 @@ from glovecal_models.diagnosis.unexplained_residual import (
     without_unsettled,
 )
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.effect import CorrectionEffect, RepairEffect, has_memory, is_asked_last
+from glovecal_models.effects.base.effect import (
+    Effect,
+    RepairEffect,
+    has_memory,
+    is_asked_last,
+)
 from glovecal_models.effects.base.findings import Finding
 from glovecal_models.effects.catalogue import relations
 
@@ -360,19 +365,14 @@ def hidden_rivals(state: State) -> State:
     first = naming.first
     if first is None or not _has_signatures(state):
         return state
-    sensor_of = own_sensors(asked.layout, [first.joints[i] for i in first.significant_joints])
-    leading, hidden = asked.by_name[first.effect], []
+    hidden = []
     for item in asked_last(state.lacking):
         if item.name in naming.confidence_set or not is_asked_beside(item, naming, asked.by_name):
             continue
         share = relations().whole(item.name).share
-        if sensor_of and first.steps is None and saved_share_of(first) < share:
-            errors = static_errors(asked.takes, sensor_of, asked.known)
-            if (
-                isinstance(leading, CorrectionEffect)
-                and item.hidden is not None
-                and item.hidden.may_be_instead(leading, asked.takes, sensor_of, errors)
-            ):
+        if first.steps is None and saved_share_of(first) < share and item.hidden is not None:
+            against = weighed(item, first, asked.takes, asked.layout, asked.by_name, asked.known)
+            if against is not None and not against.needs_cause:
                 hidden.append(item.name)
     return _with_rivals(
         state, "hidden_rivals", naming.also(hidden), "may be behind {first} and too small to be found"
@@ -424,7 +424,9 @@ def whole_first(state: State) -> State:
     found: tuple[Finding, ...] = ()
     for name in _found(state):
         mine = [item for item in state.findings if item.effect == name]
-        if relations().whole(name).parts and may_explain(effects[name], naming, mine, effects, limits):
+        if relations().whole(name).parts and may_explain(
+            effects[name], naming, mine, effects, limits, _is_instead(state, effects[name], naming.ranked[0])
+        ):
             found = (*found, *mine)
     if not found:
         return state
@@ -432,6 +434,26 @@ def whole_first(state: State) -> State:
     ranked = _listed([item.effect for item in naming.ranked])
     sentence = f"{_listed(names)} is named first: {ranked} may explain a part of it."
     return state.because("whole_first", names, sentence, signature=found)
+
+
+def needless_parts(state: State) -> State:
+    """Where these takes tell that what is named first is there and a ranked effect is not, that effect leaves
+    the confidence set."""
+    if not state.signature:
+        return state
+    first, naming = state.question.by_name[state.signature[0].effect], state.naming
+    needless = [
+        item.effect
+        for item in naming.ranked
+        if item.effect in naming.confidence_set and _is_instead(state, first, item)
+    ]
+    if not needless:
+        return state
+    kept = tuple(name for name in naming.confidence_set if name not in needless)
+    sentence = (
+        f"{_listed(needless)} explains nothing beside {first.name}, which alone makes these takes likely."
+    )
+    return state.because("needless_parts", needless, sentence, naming=replace(naming, confidence_set=kept))
 
 
 # What is left once the first of the ranking is added.
@@ -544,6 +566,7 @@ RULES = (
     Rule(repair_first),
     Rule(signature_alone),
     Rule(whole_first),
+    Rule(needless_parts),
     Rule(leave_first, is_evidence=True),
     Rule(unsettled_start),
     Rule(healthy_error),
@@ -573,6 +596,12 @@ def _repairs(state: State) -> list[str]:
     """Those that spoil reference or readings, and that nothing ranked may be instead."""
     effects, rivals = state.question.by_name, state.naming.confidence_set
     return [name for name in _found(state) if isinstance(effects[name], RepairEffect) and name not in rivals]
+
+
+def _is_instead(state: State, effect: Effect, ranked: Assessment) -> bool | None:
+    asked = state.question
+    against = weighed(effect, ranked, asked.takes, asked.layout, asked.by_name, asked.known)
+    return None if against is None else against.is_instead
 
 
 def _has_signatures(state: State) -> bool:

@@ -13,11 +13,14 @@ from glovecal_models.calibration.held_out import BaseProducts, Rows
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.limits import DIAGNOSIS_LIMITS, DiagnosisLimits
 from glovecal_models.diagnosis.naming import Naming, saved_share_of
+from glovecal_models.effects.base.assessment import Assessment
 from glovecal_models.effects.base.effect import (
+    CorrectionEffect,
     Effect,
     IntervalEffect,
     RepairEffect,
     SignatureEffect,
+    Weighed,
     is_asked_last,
 )
 from glovecal_models.effects.base.findings import Finding, FoundBefore, frames_inside
@@ -38,15 +41,18 @@ def may_explain(
     found: Sequence[Finding],
     effects: Mapping[str, Effect],
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
+    is_instead: bool | None = None,
 ) -> bool:
     """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
     effects that seem to explain a part of it, and not in equal steps of a column. These explain no more than
-    that, or they are not needed beside what was found where that is larger. ``effects``: those that were
-    ranked, by name."""
+    that, or they are not needed beside what was found where that is larger. Not where takes tell that the
+    first is there instead (``is_instead`` is False). ``effects``: those that were ranked, by name."""
     if not is_asked_beside(effect, naming, effects):
         return False
     if not naming.ranked:
         return True
+    if is_instead is False:
+        return False
     first = naming.ranked[0]
     if first.steps is None and saved_share_of(first) < relations().whole(effect.name).share:
         return _size_square(found) >= limits.whole_least_share * first.saved_square
@@ -104,6 +110,27 @@ def own_sensors(layout: Layout, joints: Sequence[str]) -> dict[str, str]:
     return {name: sensor for name, sensor in found.items() if sensor is not None}
 
 
+def weighed(
+    effect: Effect,
+    ranked: Assessment | None,
+    takes: Sequence[Take],
+    layout: Layout,
+    by_name: Mapping[str, Effect],
+    known: Sequence[KnownEffect] = (),
+) -> Weighed | None:
+    """An effect that may be hidden against one of a ranking; None where there is none, or it has no sensors
+    of its own, or the two are not taken for each other. The others as for ``signature_findings``."""
+    if ranked is None or not isinstance(effect, IntervalEffect) or effect.hidden is None:
+        return None
+    cause = by_name[ranked.effect]
+    if not isinstance(cause, CorrectionEffect):
+        return None
+    sensor_of = own_sensors(layout, [ranked.joints[i] for i in ranked.significant_joints])
+    if not sensor_of:
+        return None
+    return effect.hidden.weighed_against(cause, takes, sensor_of, static_errors(takes, sensor_of, known))
+
+
 def signature_findings(
     takes: Sequence[Take],
     layout: Layout,
@@ -135,7 +162,9 @@ def signature_findings(
     for item in asked_last(effects):
         if is_asked_beside(item, naming, by_name):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
-            if found and may_explain(item, naming, found, by_name, limits):
+            against = weighed(item, naming.first, takes, layout, by_name, known) if found else None
+            is_instead = against.is_instead if against else None
+            if found and may_explain(item, naming, found, by_name, limits, is_instead):
                 yield from found
 
 

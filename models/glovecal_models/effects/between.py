@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from glovecal_models.effects.base.relations import (
+    AIR,
     CROSSED,
     CUPPED_PALM,
     FAST,
@@ -30,13 +31,14 @@ def _rivals(effect: str, told_apart_by: Motion, *others: str) -> tuple[Rival, ..
 
 TABLE = Relations(
     rivals=(
-        *_rivals("temperature", CROSSED, "humidity", "supply_sag"),
-        *_rivals("humidity", CROSSED, "supply_sag"),
-        *_rivals("warmup_drift", CROSSED, "temperature", "humidity", "supply_sag"),
-        *_rivals("donning_shift", CROSSED, "warmup_drift", "temperature", "humidity", "supply_sag"),
+        # A glove that is put on anew is cool and dry again: what its air does shows in one wearing.
+        *_rivals("temperature", AIR, "humidity", "donning_shift", "garment_slip"),
+        *_rivals("humidity", AIR, "donning_shift", "garment_slip"),
+        *_rivals("supply_sag", CROSSED, "temperature", "humidity", "donning_shift", "garment_slip"),
         *_rivals(
-            "garment_slip", CROSSED, "warmup_drift", "temperature", "humidity", "supply_sag", "donning_shift"
+            "warmup_drift", CROSSED, "temperature", "humidity", "supply_sag", "donning_shift", "garment_slip"
         ),
+        *_rivals("donning_shift", CROSSED, "garment_slip"),
         *_rivals("cross_coupling", CUPPED_PALM, "palm_arch"),
         *_rivals("cross_coupling", ONE_FINGER, "contact_pressure"),
         # Slow turns show all of hysteresis and nothing of a delay.

@@ -8,7 +8,7 @@ from glovecal_models.effects.base.column_steps import step_columns, step_names, 
 from glovecal_models.effects.base.comparison import EffectComparison
 from glovecal_models.effects.base.context_effect import ContextEffect, SlowContextEffect
 from glovecal_models.effects.base.facts import About, Parameter, Shape, Weights
-from glovecal_models.effects.base.relations import CROSSED, ONE_FINGER
+from glovecal_models.effects.base.relations import AIR, CROSSED, ONE_FINGER
 from glovecal_models.effects.base.signals import Settings, Signals, in_joint_units
 
 OWN_PRIOR_DEG = 1.0
@@ -21,7 +21,7 @@ class Temperature(SlowContextEffect):
         "The reading changes with the temperature of glove and hand.",
         source="linear temperature coefficients of offset and gain, deg/K; cloth follows within minutes",
         shown_over="context",
-        shown_by=CROSSED,
+        shown_by=AIR,
     )
     context = ("temperature_c",)
     comparison = EffectComparison(
@@ -35,7 +35,7 @@ class Humidity(SlowContextEffect):
         "The reading changes with the humidity inside the glove.",
         source="linear coefficients of offset and gain, deg/%; follows within minutes",
         shown_over="context",
-        shown_by=CROSSED,
+        shown_by=AIR,
     )
     context = ("humidity_pct",)
 

@@ -282,6 +282,11 @@ def play_scene(plan: SessionPlan, starts: Sequence[TakeStart], counts_zero_deg: 
     donned = np.array([start.since_donned_s for start in starts])[:, None] + time
     supply = np.array([start.supply_v for start in starts])[:, None] - VOLTS_PER_HOUR * time / 3600
     air = Air(plan)
+    temperature, humidity = air.temperature_c(now, donned), air.humidity_pct(now, donned)
+    for number, start in enumerate(starts):
+        if start.air is not None:
+            changed = start.air.felt(temperature[number], humidity[number], time)
+            temperature[number], humidity[number] = changed
     return Scene(
         starts=tuple(starts),
         rate_hz=plan.rate_hz,
@@ -299,8 +304,8 @@ def play_scene(plan: SessionPlan, starts: Sequence[TakeStart], counts_zero_deg: 
         power_on_s=np.array([start.power_on_s for start in starts])[:, None] + time,
         since_donned_s=donned,
         supply_v=supply,
-        temperature_c=air.temperature_c(now, donned),
-        humidity_pct=air.humidity_pct(now, donned),
+        temperature_c=temperature,
+        humidity_pct=humidity,
         usual_air=air.usual,
     )
 

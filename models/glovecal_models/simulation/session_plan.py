@@ -28,6 +28,10 @@ FIVE_SENSORS = ("I_MCP", "I_PIP", "M_MCP", "M_PIP", "R_MCP")
 FULL_BATTERY_V = (4.02, 4.15)
 VOLTS_PER_HOUR = 0.7
 SUPPLY_JUMP_V = 0.015
+HALF_EMPTY_BATTERY_V = (3.65, 3.78)
+AIR_FELT_S = 90.0
+"""In which a glove feels 63 % of other air."""
+MOST_HUMID_PCT = 97.0
 GAP_S = (30.0, 240.0)
 DONNING_S = (60.0, 180.0)
 
@@ -125,6 +129,31 @@ def wearing_name(wearing: int) -> str:
 
 
 @dataclass(frozen=True)
+class AirChange:
+    """The glove was held into other air, which its sensors come to feel."""
+
+    warmer_c: float
+    damper_pct: float
+    """Water that is added, as relative humidity; warming and cooling change that by themselves."""
+    lasts_s: float
+    """Since when, at the take's first frame."""
+
+    def felt(
+        self, temperature_c: np.ndarray, humidity_pct: np.ndarray, time_s: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Both, any shape, ``time_s`` after the first frame."""
+        share = -np.expm1(-np.maximum(self.lasts_s + time_s, 0.0) / AIR_FELT_S)
+        changed_c = temperature_c + self.warmer_c * share
+        drier = _saturated_hpa(temperature_c) / _saturated_hpa(changed_c)
+        return changed_c, np.clip((humidity_pct + self.damper_pct * share) * drier, 0.0, MOST_HUMID_PCT)
+
+
+def _saturated_hpa(temperature_c: np.ndarray) -> np.ndarray:
+    """Vapour pressure over water (Magnus' formula with the numbers of the WMO)."""
+    return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
+
+
+@dataclass(frozen=True)
 class TakeStart:
     """The circumstances at a take's first frame."""
 
@@ -140,6 +169,8 @@ class TakeStart:
     power_on_s: float
     since_donned_s: float
     supply_v: float
+    air: AirChange | None = None
+    """None: as the room and the hand make it."""
 
 
 def schedule(plan: SessionPlan) -> tuple[TakeStart, ...]:

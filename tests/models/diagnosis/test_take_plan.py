@@ -114,11 +114,11 @@ def test_takes_that_serve_several_effects_are_recorded_once() -> None:
     plan = LackingTakes(wanted, each_s=35).plan()
     assert plan is not None
     steps = [(step.takes, step.seconds, step.motion) for step in plan.steps]
-    assert steps == [(1, 40, "ramps"), (3, 35, "more_wearings")]
-    assert [step.opens for step in plan.steps] == [("a",), ("b", "c", "d")]
-    assert plan.heading.startswith("4 further takes (2 min 25 s in all)")
+    assert steps == [(3, 40, "ramps"), (3, 35, "more_wearings")]
+    assert [step.opens for step in plan.steps] == [("a", "b"), ("c", "d")]
+    assert plan.heading.startswith("6 further takes (3 min 45 s in all)")
     each = [(take.name, take.is_put_on_anew) for take in plan.each_take]
-    assert each == [("ramps", False), ("x", True), ("y", False), ("z", False)]
+    assert each == [*[("ramps", False)] * 3, ("x", True), ("y", False), ("z", False)]
     alone = LackingTakes({"c": wanted["c"]}).plan()
     assert alone is not None
     assert [(step.takes, step.motion, step.opens) for step in alone.steps] == [(4, "more_takes", ("c",))]

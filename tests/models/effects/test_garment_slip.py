@@ -156,9 +156,39 @@ def test_a_slip_may_be_behind_a_column_that_goes_along_by_chance(glove):
         ]
 
     temperature, creep = stored_correction("temperature", {}), stored_correction("creep", {})
-    assert SLIP.may_be_instead(temperature, warmed(chance), glove.sensor_of, errors)
-    assert not SLIP.may_be_instead(temperature, warmed(means), glove.sensor_of, errors)
-    assert not SLIP.may_be_instead(creep, warmed(chance), glove.sensor_of, errors)
+    by_chance = SLIP.weighed_against(temperature, warmed(chance), glove.sensor_of, errors)
+    by_it = SLIP.weighed_against(temperature, warmed(means), glove.sensor_of, errors)
+    assert by_chance is not None
+    assert by_it is not None
+    assert (by_chance.needs_cause, by_it.needs_cause) == (False, True)
+    assert SLIP.weighed_against(creep, warmed(chance), glove.sensor_of, errors) is None
+
+
+def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
+    """The same column beside a walk, and beside what follows it, in takes in turn cool and warm."""
+    warmth = 30 + np.resize([-3.0, 4.0, 1.0], 15)
+    temperature = stored_correction("temperature", {})
+
+    def walk(since_donned_s, warm):
+        return 0.6 * np.sqrt(since_donned_s)
+
+    def weighed(error_deg):
+        takes = []
+        for number, (take, warm) in enumerate(zip(glove.takes(count=15), warmth, strict=True)):
+            time_s = take.time_s - take.time_s[0]
+            power_on_s = 30 + 60 * number + time_s
+            added = error_deg(power_on_s, warm)
+            readings = take.readings + 2 * np.array([0.0, 1.0, 0.0]) * np.reshape(added, (-1, 1))
+            context = {"temperature_c": np.full(len(time_s), warm), "power_on_s": power_on_s}
+            takes.append(replace(take, readings=readings, wearing="w1", context=context))
+        return SLIP.weighed_against(temperature, takes, glove.sensor_of, glove.errors(takes))
+
+    walked, followed = (
+        weighed(walk),
+        weighed(lambda since_donned_s, warm: np.full(len(since_donned_s), warm - 30)),
+    )
+    assert (walked.needs_cause, walked.is_instead) == (False, True)
+    assert (followed.needs_cause, followed.is_instead) == (True, False)
 
 
 def test_the_claimed_variance_grows_in_proportion_to_the_time():

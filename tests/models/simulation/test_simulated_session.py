@@ -10,7 +10,7 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.scene import play_scene
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_glove import SessionGlove
-from glovecal_models.simulation.session_plan import TAKE_MOTIONS, SessionPlan, schedule
+from glovecal_models.simulation.session_plan import TAKE_MOTIONS, AirChange, SessionPlan, schedule
 from glovecal_models.takes.table import read_takes
 from glovecal_models.takes.take import Take
 from glovecal_models.takes.write_table import write_takes
@@ -189,6 +189,17 @@ def test_one_more_take_is_of_the_same_glove_with_the_same_causes():
         for take, clean in ((session.takes[2], session.clean[2]), (more.take, more.clean))
     ]
     assert np.corrcoef(shift[0], shift[1])[0, 1] > 0.8, "the wearing's shift is that of the session"
+
+
+def test_other_air_is_felt_in_minutes_and_keeps_its_water():
+    time = np.array([0.0, 1e6])
+    cooled = AirChange(warmer_c=-10.0, damper_pct=0.0, lasts_s=0.0)
+    temperature, humidity = cooled.felt(np.full(2, 30.0), np.full(2, 50.0), time)
+    assert temperature == pytest.approx([30.0, 20.0])
+    # Saturated at 30 degrees Celsius air holds 42.47 hPa of water, at 20 degrees 23.39 hPa (CRC Handbook).
+    assert humidity == pytest.approx([50.0, 50.0 * 42.47 / 23.39], rel=0.01)
+    bag = AirChange(warmer_c=0.0, damper_pct=80.0, lasts_s=1e6)
+    assert bag.felt(np.full(2, 30.0), np.full(2, 50.0), time)[1].max() < 100.0
 
 
 @pytest.mark.parametrize("asked", [("dance", 8.0, 0), ("fast", 1.0, 0), ("fast", 8.0, -1)])

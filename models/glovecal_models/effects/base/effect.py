@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -288,6 +289,16 @@ class RepairEffect(SignatureEffect):
         return settings
 
 
+@dataclass(frozen=True)
+class Weighed:
+    """What takes say of a hidden effect and of a cause that it may be taken for."""
+
+    needs_cause: bool
+    """Whether the cause is there, be it beside the effect or alone."""
+    is_instead: bool | None
+    """True: the effect is there and the cause is not; False: the other way round; None: they do not tell."""
+
+
 class Hidden(ABC):
     """What takes of usual length may hold without showing it.
 
@@ -296,17 +307,15 @@ class Hidden(ABC):
     """
 
     @abstractmethod
-    def may_be_instead(
+    def weighed_against(
         self,
-        first: CorrectionEffect,
+        cause: CorrectionEffect,
         takes: Sequence[Take],
         sensor_of: Mapping[str, str],
         errors: Sequence[np.ndarray],
-    ) -> bool:
-        """Whether takes may hold it, though it is not found in them, where another effect is ranked first.
-
-        ``sensor_of``: the rotations on which that saves error; ``errors`` as for ``find``.
-        """
+    ) -> Weighed | None:
+        """None for a cause that it is not taken for; ``sensor_of``: the rotations on which that saves error;
+        ``errors`` as for ``find``."""
 
     @abstractmethod
     def widens(self, settings: Settings, rotations: Sequence[str]) -> bool:

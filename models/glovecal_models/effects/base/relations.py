@@ -159,14 +159,16 @@ NO_RELATIONS = Relations()
 FAST = Motion(
     "fast",
     "Swing several fingers to and fro as fast as you comfortably can, 2 to 3.5 times a second, about 25"
-    " degrees wide.",
-    45,
+    " degrees wide; three times 30 s, with a rest between.",
+    90,
+    3,
 )
 RAMPS = Motion(
     "ramps",
     "Close and open the hand slowly, turning back half-way now and then; once at 10, once at 40 degrees a"
-    " second; then hold the fist for 20 s.",
-    40,
+    " second; then hold the fist for 20 s. Three such takes of 40 s.",
+    120,
+    3,
 )
 ONE_FINGER = Motion(
     "one_finger",
@@ -186,9 +188,18 @@ SHUFFLED = Motion(
 )
 CROSSED = Motion(
     "crossed",
-    "Change one thing at a time: put in a fresh battery without switching off, take the glove off and on"
-    " without switching off, switch off and on without taking it off; 20 s of free motion after each. All of"
-    " it three times: how often a cause changed counts, not how long it was seen.",
+    "Change one thing at a time: put in another battery without switching off, a full and a half-empty one in"
+    " turn; take the glove off and on without switching off; switch off and on without taking it off; 20 s of"
+    " free motion after each. All of it three times: how often a cause changed counts, not how long it was"
+    " seen.",
+    180,
+    9,
+)
+AIR = Motion(
+    "air",
+    "Change the air at the glove, which stays on the hand and switched on: hold it into a cool box, then into"
+    " a plastic bag, then before a fan heater; three minutes each, and 20 s of free motion at the end. All of"
+    " it three times.",
     180,
     9,
 )

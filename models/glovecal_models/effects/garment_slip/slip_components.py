@@ -52,6 +52,8 @@ LIKELIHOOD_ROUNDS = 60
 SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN = "since donning", "same way", "inside takes", "between takes"
 SLIPS = (SINCE_DONNING, SAME_WAY, INSIDE, BETWEEN)
 WORN = "wearing"
+CONTEXT = "context "
+"""Before a column's name."""
 
 
 @dataclass(frozen=True)
@@ -113,26 +115,48 @@ def slip_components(
     )
 
 
-def likelier_with_cause(
-    takes: Sequence[Take],
-    errors: Sequence[np.ndarray],
-    angles: Sequence[np.ndarray],
-    context: Sequence[str],
-) -> float:
-    """Twice the log likelihood ratio of what follows recorded columns (of no name: the wearings) beside a
-    slip of any size; 0 where there is too little to say. Errors and angles as for ``slip_components``."""
-    pieces = slip_pieces(takes, errors, angles)
-    spread = float(pieces.error.std())
-    if len(pieces.error) < FEWEST_SLOW_PIECES or spread == 0:
-        return 0.0
-    parts = _covariances(pieces)
-    cause = {f"context {name}" for name in context} if context else {WORN}
-    likelihood = _Likelihood(parts, pieces.error / spread)
-    most = {name: LEAST_LOG if name[0] in cause else MOST_LOG for name in parts}
-    without, logs = likelihood.highest(most)
-    begin = {name: START_LOG if name[0] in cause else log for name, log in logs.items()}
-    free, _ = likelihood.highest(dict.fromkeys(parts, MOST_LOG), begin)
-    return 2 * (free - without)
+@dataclass(frozen=True)
+class SlipOrCause:
+    """What a slip of any size, and what follows recorded columns, make of the slow error of one rotation:
+    twice the logs of likelihood ratios, 0 where there is too little to say."""
+
+    with_cause: float = 0.0
+    """Of both over the slip without the cause, other columns being free."""
+    slip_over_cause: float = 0.0
+    """Of the slip alone over the cause alone, with a slip as of every glove, without other columns."""
+
+    @classmethod
+    def of(
+        cls,
+        takes: Sequence[Take],
+        errors: Sequence[np.ndarray],
+        angles: Sequence[np.ndarray],
+        context: Sequence[str],
+    ) -> SlipOrCause:
+        """``context``: the cause's columns; of no name: the wearings. Errors and angles as for
+        ``slip_components``."""
+        pieces = slip_pieces(takes, errors, angles)
+        spread = float(pieces.error.std())
+        if len(pieces.error) < FEWEST_SLOW_PIECES or spread == 0:
+            return cls()
+        parts = _covariances(pieces)
+        likelihood = _Likelihood(parts, pieces.error / spread)
+        columns = {name[0] for name in parts if name[0] == WORN or name[0].startswith(CONTEXT)}
+        cause = {CONTEXT + name for name in context} if context else {WORN}
+        slips: set[str] = set(SLIPS)
+
+        def at_most(log: float, *some: set[str]) -> dict[Name, float]:
+            return {name: log if name[0] in set().union(*some) else MOST_LOG for name in parts}
+
+        without, logs = likelihood.highest(at_most(LEAST_LOG, cause))
+        begin = {name: START_LOG if name[0] in cause else log for name, log in logs.items()}
+        both, _ = likelihood.highest(at_most(MOST_LOG), begin)
+        slip, _ = likelihood.highest(at_most(LEAST_LOG, columns))
+        as_every_glove = at_most(2 * np.log(EVERY_GLOVE_DEG / spread), slips)
+        alone, _ = likelihood.highest(as_every_glove | {
+            name: LEAST_LOG for name in parts if name[0] in columns - cause
+        })  # fmt: skip
+        return cls(2 * (both - without), 2 * (slip - alone))
 
 
 Name = tuple[str, str]
@@ -199,8 +223,8 @@ def _covariances(pieces: SlipPieces) -> dict[Name, np.ndarray]:
     }
     for name, column in pieces.context.items():
         value = _standard(column)
-        found[f"context {name}", "line"] = np.outer(value, value) * (1 + bent)
-        found[f"context {name}", "curve"] = _alike(value, CURVE_SD) * (1 + bent)
+        found[CONTEXT + name, "line"] = np.outer(value, value) * (1 + bent)
+        found[CONTEXT + name, "curve"] = _alike(value, CURVE_SD) * (1 + bent)
     found |= {
         (SINCE_DONNING, ""): since_donned * worn,
         (SINCE_DONNING, "bend"): since_donned * worn * bent,
