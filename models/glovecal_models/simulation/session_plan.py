@@ -30,7 +30,7 @@ VOLTS_PER_HOUR = 0.7
 SUPPLY_JUMP_V = 0.015
 HALF_EMPTY_BATTERY_V = (3.65, 3.78)
 AIR_FELT_S = 90.0
-"""In which a glove feels 63 % of other air."""
+"""In which a glove feels 63 % of other air, and forgets as much of it."""
 MOST_HUMID_PCT = 97.0
 GAP_S = (30.0, 240.0)
 DONNING_S = (60.0, 180.0)
@@ -130,19 +130,20 @@ def wearing_name(wearing: int) -> str:
 
 @dataclass(frozen=True)
 class AirChange:
-    """The glove was held into other air, which its sensors come to feel."""
+    """Until a take begins the glove is held into other air; its sensors come to feel it, and forget it."""
 
     warmer_c: float
     damper_pct: float
     """Water that is added, as relative humidity; warming and cooling change that by themselves."""
     lasts_s: float
-    """Since when, at the take's first frame."""
+    """How long, until the take's first frame."""
 
     def felt(
         self, temperature_c: np.ndarray, humidity_pct: np.ndarray, time_s: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Both, any shape, ``time_s`` after the first frame."""
-        share = -np.expm1(-np.maximum(self.lasts_s + time_s, 0.0) / AIR_FELT_S)
+        inside_s = np.maximum(self.lasts_s + np.minimum(time_s, 0.0), 0.0)
+        share = -np.expm1(-inside_s / AIR_FELT_S) * np.exp(-np.maximum(time_s, 0.0) / AIR_FELT_S)
         changed_c = temperature_c + self.warmer_c * share
         drier = _saturated_hpa(temperature_c) / _saturated_hpa(changed_c)
         return changed_c, np.clip((humidity_pct + self.damper_pct * share) * drier, 0.0, MOST_HUMID_PCT)

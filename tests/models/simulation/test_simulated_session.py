@@ -192,14 +192,14 @@ def test_one_more_take_is_of_the_same_glove_with_the_same_causes():
 
 
 def test_other_air_is_felt_in_minutes_and_keeps_its_water():
-    time = np.array([0.0, 1e6])
-    cooled = AirChange(warmer_c=-10.0, damper_pct=0.0, lasts_s=0.0)
-    temperature, humidity = cooled.felt(np.full(2, 30.0), np.full(2, 50.0), time)
-    assert temperature == pytest.approx([30.0, 20.0])
+    time = np.array([-1e6, 0.0, 1e6])
+    cooled = AirChange(warmer_c=-10.0, damper_pct=0.0, lasts_s=1e6)
+    temperature, humidity = cooled.felt(np.full(3, 30.0), np.full(3, 50.0), time)
+    assert temperature == pytest.approx([30.0, 20.0, 30.0])
     # Saturated at 30 degrees Celsius air holds 42.47 hPa of water, at 20 degrees 23.39 hPa (CRC Handbook).
-    assert humidity == pytest.approx([50.0, 50.0 * 42.47 / 23.39], rel=0.01)
+    assert humidity == pytest.approx([50.0, 50.0 * 42.47 / 23.39, 50.0], rel=0.01)
     bag = AirChange(warmer_c=0.0, damper_pct=80.0, lasts_s=1e6)
-    assert bag.felt(np.full(2, 30.0), np.full(2, 50.0), time)[1].max() < 100.0
+    assert bag.felt(np.full(3, 30.0), np.full(3, 50.0), time)[1].max() < 100.0
 
 
 @pytest.mark.parametrize("asked", [("dance", 8.0, 0), ("fast", 1.0, 0), ("fast", 8.0, -1)])

@@ -198,8 +198,8 @@ CROSSED = Motion(
 AIR = Motion(
     "air",
     "Change the air at the glove, which stays on the hand and switched on: hold it into a cool box, then into"
-    " a plastic bag, then before a fan heater; three minutes each, and 20 s of free motion at the end. All of"
-    " it three times.",
+    " a plastic bag, then before a fan heater; three minutes each, and right after each 20 s of free motion."
+    " All of it three times.",
     180,
     9,
 )
