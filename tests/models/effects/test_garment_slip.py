@@ -172,6 +172,9 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
     def walk(since_donned_s, warm):
         return 0.6 * np.sqrt(since_donned_s)
 
+    def follow(since_donned_s, warm):
+        return np.full(len(since_donned_s), warm - 30)
+
     def weighed(error_deg):
         takes = []
         for number, (take, warm) in enumerate(zip(glove.takes(count=15), warmth, strict=True)):
@@ -181,14 +184,12 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
             readings = take.readings + 2 * np.array([0.0, 1.0, 0.0]) * np.reshape(added, (-1, 1))
             context = {"temperature_c": np.full(len(time_s), warm), "power_on_s": power_on_s}
             takes.append(replace(take, readings=readings, wearing="w1", context=context))
-        return SLIP.weighed_against(temperature, takes, glove.sensor_of, glove.errors(takes))
+        found = SLIP.weighed_against(temperature, takes, glove.sensor_of, glove.errors(takes))
+        assert found is not None
+        return found.needs_cause, found.is_instead
 
-    walked, followed = (
-        weighed(walk),
-        weighed(lambda since_donned_s, warm: np.full(len(since_donned_s), warm - 30)),
-    )
-    assert (walked.needs_cause, walked.is_instead) == (False, True)
-    assert (followed.needs_cause, followed.is_instead) == (True, False)
+    assert weighed(walk) == (False, True)
+    assert weighed(follow) == (True, False)
 
 
 def test_the_claimed_variance_grows_in_proportion_to_the_time():
