@@ -197,9 +197,9 @@ CROSSED = Motion(
 )
 AIR = Motion(
     "air",
-    "Change the air at the glove, which stays on the hand and switched on: hold it into a cool box, then into"
-    " a plastic bag, then before a fan heater; three minutes each, and right after each 20 s of free motion."
-    " All of it three times.",
+    "Change the air at the glove, which stays on the hand and switched on: hold it in a cool box, then in a"
+    " plastic bag, then in front of a fan heater; three minutes each, and right after each 20 s of free"
+    " motion. All of it three times.",
     180,
     9,
 )
