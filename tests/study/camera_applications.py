@@ -230,4 +230,6 @@ def needed(errors_deg: Sequence[float], trials: int) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    import camera_applications  # by this name worker processes find its work
+
+    sys.exit(camera_applications.main(sys.argv[1:]))

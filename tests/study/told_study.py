@@ -178,4 +178,6 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    import told_study  # by this name worker processes find its work
+
+    sys.exit(told_study.main(sys.argv[1:]))
