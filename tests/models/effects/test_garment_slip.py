@@ -175,7 +175,7 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
     def follow(since_donned_s, warm):
         return np.full(len(since_donned_s), warm - 30)
 
-    def weighed(error_deg):
+    def weighed(error_deg, known=15):
         takes = []
         for number, (take, warm) in enumerate(zip(glove.takes(count=15), warmth, strict=True)):
             time_s = take.time_s - take.time_s[0]
@@ -183,6 +183,8 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
             added = error_deg(power_on_s, warm)
             readings = take.readings + 2 * np.array([0.0, 1.0, 0.0]) * np.reshape(added, (-1, 1))
             context = {"temperature_c": np.full(len(time_s), warm), "power_on_s": power_on_s}
+            if number >= known:
+                del context["temperature_c"]
             takes.append(replace(take, readings=readings, wearing="w1", context=context))
         found = SLIP.weighed_against(temperature, takes, glove.sensor_of, glove.errors(takes))
         assert found is not None
@@ -190,6 +192,7 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
 
     assert weighed(walk) == (False, True)
     assert weighed(follow) == (True, False)
+    assert weighed(walk, known=14) == (False, None)
 
 
 def test_the_claimed_variance_grows_in_proportion_to_the_time():

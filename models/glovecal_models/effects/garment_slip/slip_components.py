@@ -118,7 +118,8 @@ def slip_components(
 @dataclass(frozen=True)
 class SlipOrCause:
     """What a slip of any size, and what follows recorded columns, make of the slow error of one rotation:
-    twice the logs of likelihood ratios, 0 where there is too little to say."""
+    twice the logs of likelihood ratios, 0 where there is too little to say, or no column of the cause that
+    all takes know throughout."""
 
     with_cause: float = 0.0
     """Of both over the slip without the cause, other columns being free."""
@@ -143,6 +144,8 @@ class SlipOrCause:
         likelihood = _Likelihood(parts, pieces.error / spread)
         columns = {name[0] for name in parts if name[0] == WORN or name[0].startswith(CONTEXT)}
         cause = {CONTEXT + name for name in context} if context else {WORN}
+        if not cause & columns:
+            return cls()
         slips: set[str] = set(SLIPS)
 
         def at_most(log: float, *some: set[str]) -> dict[Name, float]:
