@@ -125,7 +125,7 @@ class BaseProducts:
         self.own = len(total) if own is None else own
         size = np.diagonal(total)
         # An effect's columns may be a thousand times larger: they must not change how the base is held.
-        held = np.where(size > 0.0, LEAST_RIDGE * size, 1.0)  # of a column that is zero no weight is asked
+        held = np.where(size > 0.0, LEAST_RIDGE * size, 1.0)  # a column that is zero gets no weight
         held[: self.own] = BASE_RIDGE * size[: self.own].mean()
         self.ridge = np.diag(held)
         if np.isfinite(self.prior_sd).any():

@@ -54,12 +54,7 @@ from glovecal_models.diagnosis.unexplained_residual import (
     without_unsettled,
 )
 from glovecal_models.effects.base.assessment import Assessment
-from glovecal_models.effects.base.effect import (
-    Effect,
-    RepairEffect,
-    has_memory,
-    is_asked_last,
-)
+from glovecal_models.effects.base.effect import Effect, RepairEffect, Weighed, has_memory, is_asked_last
 from glovecal_models.effects.base.findings import Finding
 from glovecal_models.effects.catalogue import relations
 
@@ -370,8 +365,8 @@ def hidden_rivals(state: State) -> State:
         if item.name in naming.confidence_set or not is_asked_beside(item, naming, asked.by_name):
             continue
         share = relations().whole(item.name).share
-        if first.steps is None and saved_share_of(first) < share and item.hidden is not None:
-            against = weighed(item, first, asked.takes, asked.layout, asked.by_name, asked.known)
+        if first.steps is None and saved_share_of(first) < share:
+            against = _weighed(state, item, first)
             if against is not None and not against.needs_cause:
                 hidden.append(item.name)
     return _with_rivals(
@@ -424,13 +419,11 @@ def whole_first(state: State) -> State:
     found: tuple[Finding, ...] = ()
     for name in _found(state):
         mine = [item for item in state.findings if item.effect == name]
-        if relations().whole(name).parts and may_explain(
-            effects[name], naming, mine, effects, limits, _is_instead(state, effects[name], naming.ranked[0])
-        ):
+        if relations().whole(name).parts and may_explain(effects[name], naming, mine, effects, limits):
             found = (*found, *mine)
     if not found:
         return state
-    names = [item.effect for item in found]
+    names = list(dict.fromkeys(item.effect for item in found))
     ranked = _listed([item.effect for item in naming.ranked])
     sentence = f"{_listed(names)} is named first: {ranked} may explain a part of it."
     return state.because("whole_first", names, sentence, signature=found)
@@ -445,14 +438,14 @@ def needless_parts(state: State) -> State:
     needless = [
         item.effect
         for item in naming.ranked
-        if item.effect in naming.confidence_set and _is_instead(state, first, item)
+        if item.effect in naming.confidence_set
+        and (against := _weighed(state, first, item)) is not None
+        and against.is_instead
     ]
     if not needless:
         return state
     kept = tuple(name for name in naming.confidence_set if name not in needless)
-    sentence = (
-        f"{_listed(needless)} explains nothing beside {first.name}, which alone makes these takes likely."
-    )
+    sentence = f"{first.name} alone makes these takes likely; it leaves nothing for {_listed(needless)}."
     return state.because("needless_parts", needless, sentence, naming=replace(naming, confidence_set=kept))
 
 
@@ -598,10 +591,9 @@ def _repairs(state: State) -> list[str]:
     return [name for name in _found(state) if isinstance(effects[name], RepairEffect) and name not in rivals]
 
 
-def _is_instead(state: State, effect: Effect, ranked: Assessment) -> bool | None:
+def _weighed(state: State, effect: Effect, ranked: Assessment) -> Weighed | None:
     asked = state.question
-    against = weighed(effect, ranked, asked.takes, asked.layout, asked.by_name, asked.known)
-    return None if against is None else against.is_instead
+    return weighed(effect, ranked, asked.takes, asked.layout, asked.by_name, asked.known)
 
 
 def _has_signatures(state: State) -> bool:

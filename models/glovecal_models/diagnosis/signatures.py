@@ -41,18 +41,15 @@ def may_explain(
     found: Sequence[Finding],
     effects: Mapping[str, Effect],
     limits: DiagnosisLimits = DIAGNOSIS_LIMITS,
-    is_instead: bool | None = None,
 ) -> bool:
     """Whether what an effect that is asked for last found is behind a ranking: nothing is ranked, or only
     effects that seem to explain a part of it, and not in equal steps of a column. These explain no more than
-    that, or they are not needed beside what was found where that is larger. Not where takes tell that the
-    first is there instead (``is_instead`` is False). ``effects``: those that were ranked, by name."""
+    that, or they are not needed beside what was found where that is larger. ``effects``: those that were
+    ranked, by name."""
     if not is_asked_beside(effect, naming, effects):
         return False
     if not naming.ranked:
         return True
-    if is_instead is False:
-        return False
     first = naming.ranked[0]
     if first.steps is None and saved_share_of(first) < relations().whole(effect.name).share:
         return _size_square(found) >= limits.whole_least_share * first.saved_square
@@ -162,10 +159,10 @@ def signature_findings(
     for item in asked_last(effects):
         if is_asked_beside(item, naming, by_name):
             found = item.find(takes, sensor_of, static_errors(takes, sensor_of, known))
-            against = weighed(item, naming.first, takes, layout, by_name, known) if found else None
-            is_instead = against.is_instead if against else None
-            if found and may_explain(item, naming, found, by_name, limits, is_instead):
-                yield from found
+            if found and may_explain(item, naming, found, by_name, limits):
+                against = weighed(item, naming.first, takes, layout, by_name, known)
+                if against is None or against.is_instead is not False:
+                    yield from found
 
 
 def are_pose_labels(takes: Sequence[Take]) -> bool:

@@ -91,3 +91,22 @@ def test_a_diagnosis_ends_without_any_rule(rule: str) -> None:
     rest = replace(compared, question=replace(compared.question, without=frozenset({rule})))
     *_, last = states(rest, RULES[2:14])
     assert rule not in {item.rule for item in last.decided}
+
+
+def test_a_slip_that_alone_makes_takes_likely_leaves_nothing_for_a_column_that_goes_along() -> None:
+    plan = SessionPlan(seed=5, sensors=("I_MCP", "M_MCP", "R_MCP"), take_s=30.0, rate_hz=30.0)
+    session = record_session(plan, (Cause("garment_slip", "to_one_side", 1.5),))
+    layout = Layout.from_document(
+        {
+            "name": "slips",
+            "sensors": list(plan.sensors),
+            "rotations": {name: [name] for name in plan.sensors},
+            "counts": [1, 255],
+        }
+    )
+    state = asked(session.takes, layout, Choices(linear=False))
+    [with_it, without] = (concluded(ended(state, *rules)).named for rules in ((), ("needless_parts",)))
+    assert with_it is not None
+    assert without is not None
+    assert with_it.effect == without.effect == "garment_slip"
+    assert set(without.confidence_set) - set(with_it.confidence_set) == {"temperature"}

@@ -146,19 +146,17 @@ class SlipOrCause:
         cause = {CONTEXT + name for name in context} if context else {WORN}
         if not cause & columns:
             return cls()
-        slips: set[str] = set(SLIPS)
 
-        def at_most(log: float, *some: set[str]) -> dict[Name, float]:
-            return {name: log if name[0] in set().union(*some) else MOST_LOG for name in parts}
+        def at_most(log: float, some: set[str]) -> dict[Name, float]:
+            return {name: log if name[0] in some else MOST_LOG for name in parts}
 
         without, logs = likelihood.highest(at_most(LEAST_LOG, cause))
         begin = {name: START_LOG if name[0] in cause else log for name, log in logs.items()}
-        both, _ = likelihood.highest(at_most(MOST_LOG), begin)
+        both, _ = likelihood.highest(dict.fromkeys(parts, MOST_LOG), begin)
         slip, _ = likelihood.highest(at_most(LEAST_LOG, columns))
-        as_every_glove = at_most(2 * np.log(EVERY_GLOVE_DEG / spread), slips)
-        alone, _ = likelihood.highest(as_every_glove | {
-            name: LEAST_LOG for name in parts if name[0] in columns - cause
-        })  # fmt: skip
+        as_every_glove = at_most(2 * np.log(EVERY_GLOVE_DEG / spread), set(SLIPS))
+        no_others = {name: LEAST_LOG for name in parts if name[0] in columns - cause}
+        alone, _ = likelihood.highest(as_every_glove | no_others)
         return cls(2 * (both - without), 2 * (slip - alone))
 
 
