@@ -16,7 +16,7 @@ from playwright.sync_api import Error as PlaywrightError
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from realtime_support import free_endpoint, part_of_service, store_model
+from realtime_support import eventually, free_endpoint, part_of_service, store_model
 from studio_support import NO_CHROMIUM, PATIENCE_MS, Open, Opened, installed_chromium, running_browser
 from unpacked_example import unpacked_example
 
@@ -64,6 +64,28 @@ def trained(address: str) -> str:
     """The id of a model whose takes are stored."""
     found = httpx.get(f"{address}/v1/models").json()
     return next(each["id"] for each in found if each["facts"].get("takes"))
+
+
+@pytest.fixture
+def long_job(address: str, trained: str) -> Iterator[Callable[[], str]]:
+    """Starts a job of minutes that stores nothing and ends with the test, and gives its id. Behind two of
+    them every other job waits."""
+    started = []
+
+    def start() -> str:
+        model = httpx.get(f"{address}/v1/models/{trained}").json()
+        asked = f"{address}/v1/subjects/{model['subject']}/detectability"
+        body = {"layout": model["layout"], "trials": 50, "seed": len(started)}
+        started.append(httpx.post(asked, json=body).raise_for_status().json()["id"])
+        return started[-1]
+
+    def ended(job: str) -> bool:
+        return httpx.get(f"{address}/v1/jobs/{job}").json()["state"] == "cancelled"
+
+    yield start
+    for job in started:
+        httpx.post(f"{address}/v1/jobs/{job}/cancel")
+        eventually(lambda job=job: ended(job), f"the end of {job}")
 
 
 @pytest.fixture(scope="package")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import httpx
@@ -100,14 +100,13 @@ def test_a_model_that_is_activated_elsewhere_is_shown_on_every_open_page(
         assert made in active
 
 
-def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(opened: Open, address: str) -> None:
+def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(
+    opened: Open, address: str, long_job: Callable[[], str]
+) -> None:
     one, other = opened("models").page, opened("effects").page
     expect(other.get_by_role("button", name="Jobs", exact=True)).to_be_visible()
-    takes = [each for each in httpx.get(f"{address}/v1/takes").json() if each["subject"] == "anna"]
-    body = {"subject": "anna", "layout": takes[0]["layout"], "method": "lmc_gpr", "activate": False}
-    job = httpx.post(f"{address}/v1/models/train", json=body).raise_for_status().json()
-    drawer = other.get_by_role("button", name="Jobs (1 running)")
-    drawer.click()
+    job = long_job()
+    other.get_by_role("button", name="Jobs (1 running)").click()
     other.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
     for scheme in ("dark", "light"):
         other.emulate_media(color_scheme=scheme)
@@ -115,8 +114,8 @@ def test_a_job_is_cancelled_from_the_drawer_and_every_open_page_is_told(opened: 
         assert serious(other) == []
     other.get_by_role("dialog").get_by_role("button", name="Cancel").click()
     for page in (one, other):
-        expect(page.get_by_text("train: cancelled").first).to_be_visible()
-    assert httpx.get(f"{address}/v1/jobs/{job['id']}").json()["state"] == "cancelled"
+        expect(page.get_by_text("detectability: cancelled").first).to_be_visible()
+    assert httpx.get(f"{address}/v1/jobs/{job}").json()["state"] == "cancelled"
 
 
 def test_a_model_that_is_not_there_is_said_so(opened: Open) -> None:
