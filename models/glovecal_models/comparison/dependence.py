@@ -16,9 +16,8 @@ import numpy as np
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits
 from glovecal_models.comparison.residuals import Residuals, TakeResiduals
 from glovecal_models.comparison.where.answer import Dependence
+from glovecal_models.effects.base.power_on import POWER_ON
 
-POWER_ON = "power_on_s"
-"""The context column of seconds since the glove was switched on."""
 UNITS = {"v": "V", "c": "°C", "pct": "%", "s": "s", "n": "N", "g": "g"}
 """What the end of a context column's name says of its unit: ``supply_v`` is in volts."""
 WINDOW_S = 0.1

@@ -7,13 +7,12 @@ import numpy as np
 from glovecal_models.effects.base.context_effect import PRIOR_DEG, ContextEffect
 from glovecal_models.effects.base.effect import FormSignals
 from glovecal_models.effects.base.facts import About, DriftInHolds, Parameter, Shape, Weights
+from glovecal_models.effects.base.power_on import POWER_ON, evenly_since_power_on
 from glovecal_models.effects.base.relations import CROSSED
 from glovecal_models.effects.base.signals import Settings, Signals
 
 TAU_S = (45.0, 75.0, 120.0, 200.0, 330.0, 550.0, 900.0)
 SINCE = "logarithm of the time since power-on"
-SOON_S = 30.0
-"""After power-on: before that a second counts as much as any other."""
 COLDEST = 0.7
 """In time constants: so much earlier than any take of the training the exponential may go on to rise."""
 
@@ -28,12 +27,12 @@ class WarmupDrift(ContextEffect):
         shown_by=CROSSED,
         in_holds=DriftInHolds("slows down", "warm-up"),
     )
-    context = ("power_on_s",)
+    context = (POWER_ON,)
     shape = Shape((Parameter("tau", "s", 30.0, 1200.0, "1 to 15 min", tried=TAU_S),))
     has_any_form = True
 
     def evenly(self, value: np.ndarray, settings: Settings) -> np.ndarray:
-        return np.log(np.maximum(value, 0.0) + SOON_S)
+        return evenly_since_power_on(value)
 
     def form_inputs(self, take: Signals, columns: np.ndarray, settings: Settings) -> FormSignals:
         """How cold it still is, and the time itself: the first hardly changes when the glove is warm."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
+from glovecal_models.effects.base.power_on import POWER_ON, evenly_since_power_on
 from glovecal_models.effects.garment_slip.slip_rate import MEAN_S
 from glovecal_models.regression.factorisation import potrf, potri
 from glovecal_models.takes.take import Take
@@ -45,6 +46,10 @@ ALIKE_SD = 0.5
 """Bends within so many standard deviations have about one error of posture."""
 CURVE_SD = 0.7
 """The same of a context column's curve."""
+QUICK_SD = 0.2
+"""Of a second one over the time since power-on: what is regulated swings while it warms up, each time alike.
+Five simulated gloves whose heaters swing or whose amplifiers set themselves to zero were said to slip without
+it, and with it none (2026-11-29)."""
 NUGGET = 1e-2
 """Of the variance: keeps the covariance positive."""
 LEAST_LOG, START_LOG, MOST_LOG = -7.0, -1.6, 3.0
@@ -223,7 +228,9 @@ def _covariances(pieces: SlipPieces) -> dict[Name, np.ndarray]:
         (WORN, "bend"): worn * bent,
     }
     for name, column in pieces.context.items():
-        value = _standard(column)
+        value = _standard(evenly_since_power_on(column) if name == POWER_ON else column)
+        if name == POWER_ON:
+            found[CONTEXT + name, "quick curve"] = _alike(value, QUICK_SD) * (1 + bent)
         found[CONTEXT + name, "line"] = np.outer(value, value) * (1 + bent)
         found[CONTEXT + name, "curve"] = _alike(value, CURVE_SD) * (1 + bent)
     found |= {
@@ -258,7 +265,6 @@ MEASURED_SHARE, COMPLETE_SHARE = 0.5, 0.9
 """A piece counts where so many of its frames were measured, and frames came in about as many of its seconds
 as in those of the fullest. Not as many frames: where repeated ones were dropped, that would leave the few
 pieces in which none were."""
-POWER_ON = "power_on_s"
 
 
 @dataclass(frozen=True)
