@@ -37,7 +37,7 @@ WIDEST_SHARES = (0.12, 0.25, 0.5)
 """Half-width of the widest play, in standard deviations of the motion. Wider ones imitate creep."""
 
 
-PULLS = "pull_lengths"
+PULL = "pull_lengths"
 """Settings of models that were stored without them have no pulls."""
 FEWEST_TURNS = 4
 SHORTEST_FOR_PRODUCTS_S = 5.0
@@ -57,7 +57,7 @@ class MorePlays(FurtherColumns):
     """Without products with the joint: a learned form brings those."""
 
     def constants(self, effect: CorrectionEffect, takes: Sequence[Signals]) -> Settings:
-        return {"widths": list(REPAIR_WIDTHS), PULLS: list(PULL_LENGTHS)}
+        return {"widths": list(REPAIR_WIDTHS), PULL: list(PULL_LENGTHS)}
 
 
 class Hysteresis(ArrayStateEffect):
@@ -80,12 +80,12 @@ class Hysteresis(ArrayStateEffect):
     def fit_constants(self, takes: Sequence[Signals]) -> Settings:
         longest_s = max(float(np.ptp(take.time_s)) for take in takes)
         units = fit_joint_units(takes) if longest_s >= SHORTEST_FOR_PRODUCTS_S else {}
-        return {PULLS: list(PULL_LENGTHS), **units}
+        return {PULL: list(PULL_LENGTHS), **units}
 
     def start(self, own: np.ndarray, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """Plays, and where there are pulls the joint and these."""
         plays = np.repeat(own[:, None], len(_widths(settings)), axis=1)
-        if PULLS not in settings:
+        if PULL not in settings:
             return plays
         return np.column_stack([plays, own, np.full((len(own), 2), 0.5)])
 
@@ -102,14 +102,14 @@ class Hysteresis(ArrayStateEffect):
         np.minimum(joint + width, plays, out=plays)
         np.maximum(joint - width, plays, out=plays)
         loops = _beside_products(plays - joint, own, settings)
-        if PULLS not in settings:
+        if PULL not in settings:
             return loops
-        before, pulls = state[..., -3], state[..., -2:]
+        before, pull = state[..., -3], state[..., -2:]
         keep, gain = _kept_and_gained((own - before)[..., None], settings, shape)
         state[..., -3] = own
-        pulls *= keep
-        pulls += gain
-        return np.concatenate([loops, pulls * shape], axis=-1)
+        pull *= keep
+        pull += gain
+        return np.concatenate([loops, pull * shape], axis=-1)
 
     def run_takes(
         self, state: np.ndarray, elapsed_s: np.ndarray, own: np.ndarray, settings: Settings, shape: np.ndarray
@@ -125,21 +125,21 @@ class Hysteresis(ArrayStateEffect):
             np.minimum(high, before, out=play)
             np.maximum(low, play, out=play)
             before = play
-        by_lane = (*own.shape[1:], len(widths))
-        state[..., : len(widths)] = before.reshape(by_lane)
-        loops = np.subtract(plays, joint, out=plays).reshape(len(own), *by_lane)
+        each = (*own.shape[1:], len(widths))
+        state[..., : len(widths)] = before.reshape(each)
+        loops = np.subtract(plays, joint, out=plays).reshape(len(own), *each)
         loops = _beside_products(loops, own, settings)
-        if PULLS not in settings:
+        if PULL not in settings:
             return loops
         moved = np.diff(own, axis=0, prepend=state[None, ..., -3])
-        pulls, gain = _kept_and_gained(moved[..., None], settings, shape)
+        kept, gain = _kept_and_gained(moved[..., None], settings, shape)
         before = state[..., -2:]
-        for pull, gained in zip(pulls, gain, strict=True):
+        for pull, gained in zip(kept, gain, strict=True):
             pull *= before
             pull += gained
             before = pull
         state[..., -3:] = np.concatenate([own[-1][..., None], before], axis=-1)
-        return np.concatenate([loops, pulls * shape], axis=-1)
+        return np.concatenate([loops, kept * shape], axis=-1)
 
     def unsettled(self, take: Signals, settings: Settings, shape: np.ndarray) -> np.ndarray:
         """A play forgets nothing with time: it is known once the joint has moved through all of it."""
@@ -160,8 +160,8 @@ class Hysteresis(ArrayStateEffect):
         names = tuple(f"play_{width:g}_of_widest_deg_per_deg" for width in _widths(settings))
         if _has_products(settings):
             names = (*names, *(f"{name}_per_sd" for name in names))
-        pulls = ("pull_on_closing_deg_per_deg", "pull_on_opening_deg_per_deg")
-        return Weights((*names, *pulls) if PULLS in settings else names)
+        both = ("pull_on_closing_deg_per_deg", "pull_on_opening_deg_per_deg")
+        return Weights((*names, *both) if PULL in settings else names)
 
 
 def _widths(settings: Settings) -> Sequence[float]:
@@ -183,7 +183,7 @@ def _kept_and_gained(
     moved: np.ndarray, settings: Settings, shape: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """What a move of ``moved`` (..., L, 1) degrees leaves of the two pulls and adds to them, (..., L, 2)."""
-    lengths = shape * settings[PULLS]
+    lengths = shape * settings[PULL]
     closing = np.exp(-np.maximum(moved, 0.0) / lengths)
     opening = np.exp(np.minimum(moved, 0.0) / lengths[..., ::-1])
     gained = 1.0 - np.concatenate([closing[..., :1], opening[..., 1:]], axis=-1)
