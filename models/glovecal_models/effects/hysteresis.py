@@ -39,6 +39,7 @@ WIDEST_SHARES = (0.12, 0.25, 0.5)
 
 PULL = "pull_lengths"
 """Settings of models that were stored without them have no pulls."""
+CLOSING_AND_OPENING = np.array([1.0, -1.0])
 FEWEST_TURNS = 4
 SHORTEST_FOR_PRODUCTS_S = 5.0
 """Of the longest take. Strides are one cycle over and over: there a product with the joint is a function of
@@ -183,11 +184,13 @@ def _kept_and_gained(
     moved: np.ndarray, settings: Settings, shape: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """What a move of ``moved`` (..., L, 1) degrees leaves of the two pulls and adds to them, (..., L, 2)."""
-    lengths = shape * settings[PULL]
-    closing = np.exp(-np.maximum(moved, 0.0) / lengths)
-    opening = np.exp(np.minimum(moved, 0.0) / lengths[..., ::-1])
-    gained = 1.0 - np.concatenate([closing[..., :1], opening[..., 1:]], axis=-1)
-    return closing * opening, gained
+    grows, goes = settings[PULL]
+    ways = np.maximum(moved * CLOSING_AND_OPENING, 0.0)
+    ways /= shape
+    kept = np.exp(ways * (-1.0 / grows))
+    gained = 1.0 - kept
+    kept *= np.exp(ways[..., ::-1] * (-1.0 / goes))
+    return kept, gained
 
 
 def _turns(take: Signals) -> int:

@@ -195,6 +195,23 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
     assert weighed(walk, known=14) == (False, None)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("period", [0.5, 0.7, 1.0])
+def test_a_warm_up_that_swings_is_no_slip(glove, seed, period):
+    """What is regulated swings as it warms up, alike each time: switched on three times, put on five times."""
+    takes = []
+    for number, take in enumerate(replace(glove, seed=seed).takes(count=15)):
+        power_on_s = 30 + 60 * (number % 5) + take.time_s - take.time_s[0]
+        swing = np.exp(-power_on_s / 200) * np.cos(2 * np.pi * np.log(power_on_s + 30) / period)
+        readings = take.readings + 2 * 2.0 * np.outer(swing, [0.0, 1.0, 0.0])
+        context = {"power_on_s": power_on_s}
+        takes.append(replace(take, readings=readings, wearing=f"w{number // 3}", context=context))
+    warm_up = stored_correction("warmup_drift", {})
+    found = SLIP.weighed_against(warm_up, takes, glove.sensor_of, glove.errors(takes))
+    assert found is not None
+    assert (found.needs_cause, found.is_instead) == (True, False)
+
+
 def test_the_claimed_variance_grows_in_proportion_to_the_time():
     interval = SlipInterval([SlipGrowth(2.0), SlipGrowth(0.0)])
     ages = np.array([-1.0, 0.0, 60.0, 240.0, 1e6, 1e9])
