@@ -198,7 +198,7 @@ def test_a_walk_and_a_cause_of_many_takes_are_told_from_each_other(glove):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("period", [0.5, 0.7, 1.0])
 def test_a_warm_up_that_swings_is_no_slip(glove, seed, period):
-    """What is regulated swings as it warms up, alike each time: switched on three times, put on five times."""
+    """What is regulated swings as it warms up, alike each time: powered three times, put on five times."""
     takes = []
     for number, take in enumerate(replace(glove, seed=seed).takes(count=15)):
         power_on_s = 30 + 60 * (number % 5) + take.time_s - take.time_s[0]
