@@ -65,7 +65,7 @@ class Hysteresis(ArrayStateEffect):
     name = "hysteresis"
     about = About(
         "The sensor sticks: at the same angle it reads differently on the way up and on the way down.",
-        source="Prandtl-Ishlinskii: Kuhnen 2003, European Journal of Control 9(4) 407; size: Mattmann 2008",
+        source="Kuhnen 2003, European Journal of Control 9(4) 407; Dahl 1968; size: Mattmann 2008",
         shown_over="angle both ways",
         shows_in=("direction", "speed"),
         shown_by=RAMPS,
