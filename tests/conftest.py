@@ -18,10 +18,12 @@ import sysconfig
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
 import httpx
+import httpx._transports.default as _transport
 import hypothesis
 import pytest
 
@@ -38,6 +40,9 @@ hypothesis.settings.load_profile("same everywhere")
 for _part in ("connect", "read", "write", "pool"):
     # a test's request waits for its answer as pages do: five seconds are too few on a busy computer
     setattr(inspect.signature(httpx.Client).parameters["timeout"].default, _part, 120.0)
+
+# tests ask thousands of times, and reading this computer's certificates takes longer than most answers
+_transport.create_ssl_context = cache(_transport.create_ssl_context)
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 REQUIRE_EVERYTHING = "GLOVECAL_REQUIRE_EVERYTHING"

@@ -15,8 +15,9 @@ from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
+    from glovecal_models.calibration.methods import Method
     from glovecal_models.calibration.model import CalibrationModel as InnerModel
-    from glovecal_models.calibration.training_settings import Method, TrainingSettings
+    from glovecal_models.calibration.training_settings import TrainingSettings
     from glovecal_models.improvement.addition import Addition as InnerAddition
 
 

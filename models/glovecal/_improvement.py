@@ -18,7 +18,7 @@ from glovecal_models.progress import Cancel
 from glovecal_models.takes.take import Take
 
 if TYPE_CHECKING:
-    from glovecal_models.calibration.training_settings import Method
+    from glovecal_models.calibration.methods import Method
     from glovecal_models.improvement.improvement import Improvement as InnerImprovement
 
 

@@ -8,8 +8,6 @@ from typing import Literal
 
 from glovecal_client.capture.cyberglove3.card import card_layout
 from glovecal_client.encryption.kept_file import open_kept
-from glovecal_service.exports.motion_files import formats as motion_files
-from glovecal_service.exports.vendor_calibrations import formats as vendor_calibrations
 
 FileKind = Literal["model", "calibration", "motion", "card", "video", "table"]
 LOOKED_AT = 65536
@@ -32,11 +30,15 @@ def _is_model(start: bytes) -> bool:
 
 
 def _is_calibration(start: bytes) -> bool:
-    return vendor_calibrations.recognised(vendor_calibrations.as_text(start)) is not None
+    from glovecal_service.exports.vendor_calibrations import formats  # slow to load, as below
+
+    return formats.recognised(formats.as_text(start)) is not None
 
 
 def _is_motion(start: bytes) -> bool:
-    return motion_files.recognised(start) is not None
+    from glovecal_service.exports.motion_files import formats  # and every list of takes loads this file
+
+    return formats.recognised(start) is not None
 
 
 def _is_card(start: bytes) -> bool:

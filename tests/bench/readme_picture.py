@@ -10,9 +10,10 @@ import sys
 import matplotlib as mpl
 import numpy as np
 
+from glovecal_models.calibration.methods import METHODS
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import METHODS, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.compare import compare
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import evaluation_segment, sampling_protocol

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from paper_session import CALIBRATIONS, EVALUATION_HZ, PaperSession, offline, paper_session
 
-from glovecal_models.calibration.training_settings import Method
+from glovecal_models.calibration.methods import Method
 from glovecal_models.hand.rotations import HAND_ROTATIONS
 
 ANGLES_DEG = (0.0, 25.0)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from paper_session import CALIBRATIONS, PaperSession, offline, paper_session
 
-from glovecal_models.calibration.training_settings import Method
+from glovecal_models.calibration.methods import Method
 from glovecal_models.hand.rotations import FINGERS
 
 PAPER_CM: dict[str, tuple[float, float, float, float]] = {"I": (7.53, 5.25, 0.08, 1.75)}

@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 from asked_session import AT_ONCE_S, RECORDING, asked_session
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.samples import Samples, gather_samples
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS, completed
 from glovecal_models.hand.skeleton import Skeleton, hand_skeleton

@@ -13,7 +13,7 @@ from multiple_wearings import WEARINGS, multiple_wearings
 from paper_session import CALIBRATIONS, EVALUATION_HZ, PaperSession, paper_session
 from table_3 import table_3
 
-from glovecal_models.calibration.training_settings import Method
+from glovecal_models.calibration.methods import Method
 from glovecal_models.progress import Report
 
 QUICK_HZ, QUICK_SAMPLES = 30.0, 120

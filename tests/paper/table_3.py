@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from paper_session import CALIBRATIONS, PaperSession, paper_session
 
-from glovecal_models.calibration.training_settings import Method
+from glovecal_models.calibration.methods import Method
 from glovecal_models.simulation.simulated_hand import TABLE_3_POSES
 
 PAPER_DEG: dict[str, tuple[tuple[float, float], ...]] = {

@@ -96,5 +96,5 @@ def dispatched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Store
     """A store whose jobs are run, by one pair of worker processes for all tests."""
     settings = Settings(data=tmp_path_factory.mktemp("dispatched"), database=None, artifacts=None, workers=2)
     kinds = {**ANSWERED, "count": CountingJob()}
-    with Store.open(settings) as store, Dispatcher(store, settings, kinds) as dispatcher:
+    with Store.open(settings) as store, Dispatcher(store, settings, lambda: kinds) as dispatcher:
         yield store, dispatcher

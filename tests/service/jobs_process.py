@@ -17,7 +17,7 @@ from glovecal_service.store import Store
 
 def run_jobs(settings: Settings) -> None:
     """Run jobs until all are finished."""
-    with Store.open(settings) as store, Dispatcher(store, settings, {"count": CountingJob()}):
+    with Store.open(settings) as store, Dispatcher(store, settings, lambda: {"count": CountingJob()}):
         while store.jobs.list(only_unfinished=True):
             time.sleep(0.05)
 

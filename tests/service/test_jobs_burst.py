@@ -38,7 +38,7 @@ def test_a_burst_of_trainings_ends_and_is_fair(
 
     of_anna = [train("anna", seed) for seed in range(trainings - 5)]
     of_others = [train(name, seed) for seed, name in enumerate(("ben", "ben", "ben", "carla", "carla"))]
-    with Dispatcher(store, sqlite_settings, ANSWERED):
+    with Dispatcher(store, sqlite_settings, lambda: ANSWERED):
         wait_for(lambda: not store.jobs.unfinished(), 500)
     jobs = {job.id: job for job in store.jobs.list()}
     assert {job.state for job in jobs.values()} == {"done"}, {job.error for job in jobs.values()}

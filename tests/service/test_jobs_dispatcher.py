@@ -43,7 +43,7 @@ def test_a_job_runs_in_polite_worker_processes(dispatched, ledger):
 def test_one_command_runs_a_single_task_itself(sqlite_store, sqlite_settings, ledger):
     before = os.nice(0)
     with Dispatcher(
-        sqlite_store, sqlite_settings, {"count": CountingJob()}, of_one_command=True
+        sqlite_store, sqlite_settings, lambda: {"count": CountingJob()}, of_one_command=True
     ) as dispatcher:
         (facts,) = result_of(sqlite_store, create(sqlite_store, ledger, [4]).id)["facts"]
         assert facts["pid"] == os.getpid()
@@ -144,12 +144,12 @@ def test_a_process_that_cannot_start_is_told_and_its_own_words_are_logged(
 
 
 def test_stopping_leaves_the_job_for_the_next_start(sqlite_store, sqlite_settings, ledger):
-    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}):
+    with Dispatcher(sqlite_store, sqlite_settings, lambda: {"count": CountingJob()}):
         job = create(sqlite_store, ledger, [1, 2, 3], seconds=0.2, here=True)
         wait_for(lambda: noted(ledger, "done"))
     assert sqlite_store.jobs.get(job.id).state == "queued"
     done = noted(ledger, "done")
-    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}):
+    with Dispatcher(sqlite_store, sqlite_settings, lambda: {"count": CountingJob()}):
         assert result_of(sqlite_store, job.id)["sums"] == [1, 3, 6]
     assert noted(ledger, "done")[: len(done)] == done
     assert sorted(noted(ledger, "done")) == [1, 2, 3]

@@ -46,7 +46,7 @@ def another_user(not_here):
 
 def test_another_user_runs_nothing(sqlite_store, sqlite_settings, tmp_path, another_user):
     before = listening()
-    with Dispatcher(sqlite_store, sqlite_settings, {"count": CountingJob()}) as dispatcher:
+    with Dispatcher(sqlite_store, sqlite_settings, lambda: {"count": CountingJob()}) as dispatcher:
         assert result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [1, 2]))["sums"] == [1, 3]
         ports = listening() - before
         open_to_all = LocalCluster(
@@ -66,7 +66,7 @@ def test_another_user_runs_nothing(sqlite_store, sqlite_settings, tmp_path, anot
 def test_the_ports_close_when_nobody_needs_them(sqlite_store, sqlite_settings, tmp_path):
     before = listening()
     settings = sqlite_settings.model_copy(update={"workers_idle_s": 0.5})
-    with Dispatcher(sqlite_store, settings, {"count": CountingJob()}) as dispatcher:
+    with Dispatcher(sqlite_store, settings, lambda: {"count": CountingJob()}) as dispatcher:
         for number in (3, 4):
             result_of(sqlite_store, create(sqlite_store, tmp_path / "ledger", [number]))
             wait_for(lambda: not dispatcher.workers.started)

@@ -13,10 +13,11 @@ import pytest
 from loop_by_hand import LoopByHand
 
 from glovecal_client.wire.frame import Frame
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import free_segment, segments
 from glovecal_models.simulation.simulated_glove import (

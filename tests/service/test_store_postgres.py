@@ -24,7 +24,7 @@ pytestmark = pytest.mark.needs_postgres
 
 def test_nothing_acknowledged_is_lost_when_the_server_is_killed(own_postgres, sqlite_settings):
     settings = sqlite_settings.model_copy(update={"database": own_postgres.new_database()})
-    with Store.open(settings) as store, Dispatcher(store, settings, ANSWERED):
+    with Store.open(settings) as store, Dispatcher(store, settings, lambda: ANSWERED):
         acknowledged, refused, stop = [], [], threading.Event()
 
         def write() -> None:

@@ -11,9 +11,10 @@ import numpy as np
 from blind_glove import BlindGlove, Nuisance
 from simulated_camera import ON_OTHER_HANDS, SimulatedCamera, lasting_noise
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.diagnose import diagnose
 from glovecal_models.errors import BadInput, NotTrainable
 from glovecal_models.layout import Layout

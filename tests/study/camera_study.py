@@ -19,7 +19,7 @@ import numpy as np
 from camera_gloves import CAMERA_SIZE, TRUE_SIZE, CalibratedGlove, CameraGlove, clock_error
 from intervals import wilson
 
-from glovecal_models.calibration.training_settings import Method
+from glovecal_models.calibration.methods import Method
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 
 GLOVES = {

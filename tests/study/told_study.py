@@ -20,11 +20,12 @@ from blind_glove import BlindGlove
 from glove_choices import few_takes
 from intervals import clopper_pearson
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.text import dead_sensor_sentences
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.worn_glove import GloveFinding, worn_glove_findings
 from glovecal_models.errors import BadInput
 from glovecal_models.takes.clock_scan import clock_offsets

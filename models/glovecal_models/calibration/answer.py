@@ -88,7 +88,7 @@ class Trained(Answer):
     """Held out, had there been no prior of people; null: none was asked for, or nothing could be trained."""
 
     def presentation(self) -> Presentation:
-        from glovecal_models.calibration.training_settings import OF_SHAPES
+        from glovecal_models.calibration.methods import OF_SHAPES
 
         facts = [Fact("", sentence) for sentence in self._sentences()]
         if self.method not in OF_SHAPES:

@@ -20,6 +20,7 @@ import numpy as np
 from glovecal_models.calibration.added_effect import AddedEffect, EffectRequest, form_values
 from glovecal_models.calibration.fit_task import FitResult, FitTask, run_task
 from glovecal_models.calibration.fitted_effects import fitted_effects, with_curves
+from glovecal_models.calibration.methods import LINEAR_METHODS
 from glovecal_models.calibration.model import CalibrationModel, restore_regressor
 from glovecal_models.calibration.prepared_takes import (
     OwnSignal,
@@ -31,7 +32,7 @@ from glovecal_models.calibration.prepared_takes import (
 from glovecal_models.calibration.samples import Samples, joined_variances, sampled_rows
 from glovecal_models.calibration.template import palm_samples
 from glovecal_models.calibration.training_plan import correspondence_by, task_for
-from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.layout import Correspondence
 from glovecal_models.progress import Cancel, stop_if
 from glovecal_models.regression.fast_lmc import LmcOptimum

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from glovecal_models.calibration.kernel_choice import fit_best_kernel
+from glovecal_models.calibration.methods import LINEAR_METHODS
 from glovecal_models.calibration.people_prior import plane_of_people, takes_by_wearing
 from glovecal_models.calibration.sample_weight import Recorded, fit_linear_with_variance, fit_weighted
 from glovecal_models.calibration.template import fit_on_plane, plane_for
-from glovecal_models.calibration.training_settings import LINEAR_METHODS, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.hand.rotations import ACTIVE_RANGE_DEG
 from glovecal_models.progress import Cancel, Report
 from glovecal_models.regression.kernel_candidates import CHOOSING

@@ -20,7 +20,6 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from glovecal_models.calibration.sample_weight import effective_sample_ratio
 from glovecal_models.calibration.samples import gather_samples, linear_correspondence
@@ -396,6 +395,8 @@ class _Tree:
 
     def learn(self) -> None:
         """The most probable variances."""
+        from scipy.optimize import minimize  # slow to load, and every model loads this file
+
         optimum = minimize(self._objective, self._expected, jac=True, method="L-BFGS-B")
         self._set(optimum.x)
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from glovecal_models.calibration.fit_task import FitTask
 from glovecal_models.calibration.folds import folds_over_takes, usable_folds, wearing_groups
+from glovecal_models.calibration.methods import LINEAR_METHODS, METHODS, Method
 from glovecal_models.calibration.samples import (
     Samples,
     gather_samples,
@@ -35,13 +36,7 @@ from glovecal_models.calibration.template import (
     two_shapes,
     with_sensors_of,
 )
-from glovecal_models.calibration.training_settings import (
-    LINEAR_METHODS,
-    METHODS,
-    Method,
-    TrainingSettings,
-    left_out_settings,
-)
+from glovecal_models.calibration.training_settings import TrainingSettings, left_out_settings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Correspondence, Layout
 from glovecal_models.names import did_you_mean

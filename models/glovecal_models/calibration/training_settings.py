@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from glovecal_models.calibration.added_effect import EffectRequest
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.people_prior import PeoplePlane
 from glovecal_models.calibration.samples import DEFAULT_SAMPLES
@@ -24,20 +25,6 @@ from glovecal_models.regression.kernel_candidates import CHOOSING
 from glovecal_models.regression.kernel_scores import kernel_of
 from glovecal_models.regression.regressor import RuleRegressor
 from glovecal_models.takes.take import Take
-
-Method = Literal[
-    "raw", "linear", "lmc_gpr", "spgp", "auto", "polynomial_gpr", "general_gpr", "two_shapes", "template"
-]
-METHODS: tuple[Method, ...] = get_args(Method)
-"""``raw`` is no calibration at all, the scale that the others are read against; ``auto`` takes for each
-rotation what fits it (``kernel_choice``), ``polynomial_gpr`` and ``general_gpr`` insist on a kind of kernel;
-``two_shapes`` and ``template`` are calibrations by scale and offset (``template``).
-"""
-OF_SHAPES: tuple[Method, ...] = ("two_shapes", "template")
-"""Methods that learn from hand shapes of which only the name is known."""
-LINEAR_METHODS: tuple[Method, ...] = ("raw", "linear", "two_shapes", "template")
-"""Those whose regressors are planes."""
-"""Called with a sentence and the fraction done, 0 to 1."""
 
 
 class PriorPlane(NamedTuple):

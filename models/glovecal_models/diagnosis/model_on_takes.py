@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from glovecal_models.calibration.methods import LINEAR_METHODS
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import (
-    LINEAR_METHODS,
-    declared_effects,
-    repaired_takes,
-    requested_effects,
-)
+from glovecal_models.calibration.training_settings import declared_effects, repaired_takes, requested_effects
 from glovecal_models.comparison.like_postures import OddTake
 from glovecal_models.comparison.noise_floor import rotation_noise
 from glovecal_models.comparison.odd_takes import fitting, odd_takes

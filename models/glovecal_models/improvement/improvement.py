@@ -12,11 +12,12 @@ from typing import Any, Literal
 import numpy as np
 
 from glovecal_models.calibration.leave_out import HeldOutErrors, held_out_errors
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.prepared_takes import PreparedTakes
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import UsableSensors
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.ceiling.ceiling import Ceiling
 from glovecal_models.comparison.floor_estimate import NoiseFloor
 from glovecal_models.comparison.limits import COMPARISON_LIMITS, ComparisonLimits

@@ -18,6 +18,7 @@ from glovecal_models.calibration.samples import SensorSensitivity
 from glovecal_models.effects.base.signals import Settings, in_joint_units
 from glovecal_models.errors import BadInput
 from glovecal_models.quick_check.answer import CheckedPose, RefusedPose
+from glovecal_models.quick_check.key_poses import KEY_POSES_DEG
 from glovecal_models.quick_check.wearing_shift import PoseError, WearingShift
 from glovecal_models.takes.still_hand import block_means, stays, still_stretches
 from glovecal_models.takes.take import Take
@@ -36,15 +37,6 @@ REPEAT_SD_DEG = 2.5
 """How far a person's pose is from the last time it was taken."""
 OTHER_HAND_SD_DEG = 6.0
 """How far it is from a usual hand's."""
-KEY_POSES_DEG: Mapping[str, Mapping[str, float]] = {
-    "flat": {f"{finger}_{joint}": 0.0 for finger in "IMRP" for joint in ("MCP", "PIP")}
-    | dict.fromkeys(("IM_ABD", "MR_ABD", "RP_ABD", "T_MCP", "T_IP"), 3.0),
-    "fist": {f"{finger}_MCP": 86.0 for finger in "IMRP"} | {f"{finger}_PIP": 95.0 for finger in "IMRP"},
-    "spread": {f"{finger}_{joint}": 0.0 for finger in "IMRP" for joint in ("MCP", "PIP")}
-    | dict.fromkeys(("IM_ABD", "MR_ABD", "RP_ABD"), 24.0),
-}
-"""The key poses that every hand takes much alike (Wang & Neff 2013, section 5.1.1); joints that people hold
-differently in them are not given."""
 
 
 @dataclass(frozen=True, eq=False)

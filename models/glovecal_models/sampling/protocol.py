@@ -23,7 +23,7 @@ from typing import Any, Literal
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.names import did_you_mean
-from glovecal_models.quick_check.held_poses import KEY_POSES_DEG
+from glovecal_models.quick_check.key_poses import KEY_POSES_DEG
 
 Kind = Literal["range", "verification", "fk_independent", "fk_cross_couple", "ik"]
 """``range`` shows how far each sensor goes, ``verification`` whether the glove stayed where it was; the

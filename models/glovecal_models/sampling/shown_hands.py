@@ -31,7 +31,8 @@ from glovecal_models.hand.rotations import (
     WRIST,
 )
 from glovecal_models.hand.skeleton import Skeleton
-from glovecal_models.quick_check.held_poses import KEY_POSES_DEG, OTHER_HAND_SD_DEG, REPEAT_SD_DEG
+from glovecal_models.quick_check.held_poses import OTHER_HAND_SD_DEG, REPEAT_SD_DEG
+from glovecal_models.quick_check.key_poses import KEY_POSES_DEG
 from glovecal_models.sampling.guided.labelled_takes import FK, LabelledTake, contact_of
 from glovecal_models.sampling.inverse_kinematics.contact import Contact, Rod, TipChains, Touch
 from glovecal_models.sampling.inverse_kinematics.follow import HandShape, follow, steadied

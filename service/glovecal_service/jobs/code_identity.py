@@ -12,8 +12,6 @@ from importlib.metadata import entry_points, version
 from importlib.resources import files
 from pathlib import Path
 
-from glovecal_models.effects.catalogue import GROUP
-
 _JOBS = Path(__file__).parent
 _SOURCE = Path(str(files("glovecal_models"))), _JOBS.parent / "questions", _JOBS
 _PACKAGES = "numpy", "scipy", "distributed"
@@ -24,6 +22,8 @@ _LONGEST, _MOST_SHOWN = 60, 4
 def code_identity() -> Mapping[str, str]:
     """By part: ``glovecal`` (its version), ``source`` (a hash), packages, and those with effects of a user's
     own."""
+    from glovecal_models.effects.catalogue import GROUP  # slow to load, and most commands have no workers
+
     own = {each.dist.name: each.dist.version for each in entry_points(group=GROUP) if each.dist is not None}
     packages = {name: version(name) for name in _PACKAGES}
     return {"glovecal": version("glovecal-service"), "source": _source_hash()} | packages | own

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from glovecal_models.errors import GlovecalError
 from glovecal_service.jobs.finished_tasks import FinishedTasks
@@ -31,7 +31,7 @@ class Dispatcher:
         self,
         store: Store,
         settings: Settings,
-        kinds: Mapping[str, JobKind],
+        kinds: Callable[[], Mapping[str, JobKind]],
         *,
         of_one_command: bool = False,
     ) -> None:
@@ -118,9 +118,10 @@ class Dispatcher:
             self.workers.reset()
 
     def _begin(self, job: JobRecord) -> None:
-        kind = self._kinds.get(job.kind)
+        kinds = self._kinds()
+        kind = kinds.get(job.kind)
         if kind is None:
-            known = ", ".join(sorted(self._kinds))
+            known = ", ".join(sorted(kinds))
             self._store.jobs.fail(job.id, job.attempt, f"no job of kind {job.kind!r}; there are {known}")
             return
         run = JobRun(

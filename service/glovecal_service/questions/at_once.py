@@ -6,17 +6,18 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel
 
-from glovecal_models.calibration import artifact
-from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.presentation.document import Answer
 from glovecal_service.plain import read
 from glovecal_service.store.records import ModelRecord
 from glovecal_service.store.store import Store
+
+if TYPE_CHECKING:
+    from glovecal_models.calibration.model import CalibrationModel
+    from glovecal_models.calibration.predictor import GlovePredictor
 
 Request = TypeVar("Request", bound=BaseModel)
 Found = TypeVar("Found", bound=Answer)
@@ -36,6 +37,9 @@ class Predictors:
 
     def get(self, id: str) -> tuple[CalibrationModel, GlovePredictor]:
         """By full id. Raises NotFound, DamagedArtifact."""
+        from glovecal_models.calibration import artifact  # slow to load, and most commands open no model
+        from glovecal_models.calibration.predictor import GlovePredictor
+
         with self._lock:
             if id in self._kept:
                 self._kept.move_to_end(id)

@@ -13,6 +13,7 @@ from glovecal_models.calibration.answer import Trained
 from glovecal_models.calibration.artifact import load
 from glovecal_models.calibration.fit_task import FitResult, FitTask
 from glovecal_models.calibration.fit_task import run_task as run_fit
+from glovecal_models.calibration.methods import LINEAR_METHODS, Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.order_confounding import order_confounding
 from glovecal_models.calibration.people_prior import PeoplePrior
@@ -25,7 +26,7 @@ from glovecal_models.calibration.text import (
 )
 from glovecal_models.calibration.training import assemble, train
 from glovecal_models.calibration.training_plan import TrainingPlan, plan_training
-from glovecal_models.calibration.training_settings import LINEAR_METHODS, Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.odd_takes import odd_takes
 from glovecal_models.errors import BadInput, LayoutMismatch, NotTrainable
 from glovecal_models.hand.rotations import Handedness

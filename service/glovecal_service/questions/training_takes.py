@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from glovecal_models.calibration.methods import OF_SHAPES
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import OF_SHAPES, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.hand.rotations import HANDS
 from glovecal_models.layout import Layout

@@ -5,41 +5,21 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
-from functools import cache
 from importlib.metadata import version
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
+from pydantic import BaseModel
 from starlette.concurrency import run_in_threadpool
-from starlette.routing import BaseRoute
 
 from glovecal_models.worker_processes import pin_blas_to_one_thread
 from glovecal_service.camera.started_cameras import CameraAccess
 from glovecal_service.filming import Filming
 from glovecal_service.first_run.simulated_glove import StreamedGlove
 from glovecal_service.jobs.dispatcher import Dispatcher
+from glovecal_service.jobs.job_kind import JobKind
 from glovecal_service.logs import Word
-from glovecal_service.questions.catalogue import ANSWERED
-from glovecal_service.rest import asking
-from glovecal_service.rest.access import audit, keys, login, people, provider_login
-from glovecal_service.rest.effect import (
-    catalogue,
-    picture,
-    trial,
-)
-from glovecal_service.rest.first_run import hidden_effects, simulated_glove
-from glovecal_service.rest.glove import (
-    camera_files,
-    cameras,
-    commands,
-    connecting,
-    films,
-    layouts,
-    live,
-    recordings,
-)
-from glovecal_service.rest.http import health
 from glovecal_service.rest.http.access import AccessGuard
 from glovecal_service.rest.http.damage_search import search_for_damage
 from glovecal_service.rest.http.dependencies import Parts, Predictors
@@ -50,34 +30,7 @@ from glovecal_service.rest.http.provider import Provider
 from glovecal_service.rest.http.request_guard import BodyGuard, RequestGuard, asks_who
 from glovecal_service.rest.http.temporary_folder import sweep_temporary_folders
 from glovecal_service.rest.http.upload_folder import UploadFolder
-from glovecal_service.rest.job import jobs
-from glovecal_service.rest.model import (
-    comparison,
-    fall,
-    model_import,
-    models,
-    predictions,
-    refinement,
-    residuals,
-    vendor_calibrations,
-)
-from glovecal_service.rest.overview import overview
-from glovecal_service.rest.sampling import next_steps, samplings
-from glovecal_service.rest.subject import erasures, subjects, usual_hand
-from glovecal_service.rest.take import (
-    clocks,
-    dropped,
-    hands,
-    motion,
-    reference,
-    reference_import,
-    series,
-    session_drift,
-    table_import,
-    takes,
-    uploads,
-    videos,
-)
+from glovecal_service.rest.routes import every_route, routers
 from glovecal_service.settings import Settings
 from glovecal_service.store.erasure import finish_erasures
 from glovecal_service.store.errors import StoreError
@@ -94,44 +47,6 @@ MULTIPART_BYTES = 10_000
 BODY_PATIENCE_S = 30.0
 FIRST_SWEEP_AFTER_S, SWEEP_EVERY_S = 60.0, 3600.0
 SEND_EVERY_S = 5.0
-ROUTERS = (
-    asking,
-    *(subjects, erasures, usual_hand),
-    *(layouts, live, commands, recordings, films, cameras, camera_files, samplings),
-    *(connecting, simulated_glove, hidden_effects),
-    *(
-        clocks,
-        hands,
-        series,
-        session_drift,
-        table_import,
-        takes,
-        reference,
-        reference_import,
-        uploads,
-        dropped,
-        motion,
-        videos,
-    ),
-    *(
-        model_import,
-        vendor_calibrations,
-        refinement,
-        models,
-        predictions,
-        comparison,
-        catalogue,
-    ),
-    *(
-        next_steps,
-        residuals,
-        picture,
-        fall,
-        trial,
-    ),
-    *(jobs, overview, health),
-    *(keys, people, audit),
-)
 
 
 def create_app(
@@ -143,8 +58,8 @@ def create_app(
 ) -> FastAPI:
     """The application; its lifespan opens the store (unless given) and runs the job dispatcher.
 
-    ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told, and nobody
-    but who has the data folder reaches it.
+    ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told, nobody but who
+    has the data folder reaches it, and it has no routes until ``add_answering`` gives it some.
 
     On loopback whoever reaches the port may do everything, and ``RequestGuard`` keeps pages of other sites
     out; beyond it ``AccessGuard`` asks who it is.
@@ -164,7 +79,7 @@ def create_app(
             settings, opened, uploads_folder, metrics, Predictors(opened), Filming(settings.films_folder),
             CameraAccess(settings.zenoh), StreamedGlove(settings), provider,
         )  # fmt: skip
-        dispatcher = Dispatcher(opened, settings, ANSWERED, of_one_command=of_one_command)
+        dispatcher = Dispatcher(opened, settings, _answered, of_one_command=of_one_command)
         dispatcher.start()
         sweeping = asyncio.create_task(_sweep_hourly(opened, settings))
         searching = asyncio.create_task(search_for_damage(opened))
@@ -193,31 +108,25 @@ def create_app(
         redoc_url=None,
         openapi_url=f"{PREFIX}/openapi.json",
         redirect_slashes=False,
-        routes=_routes(),
+        routes=[] if of_one_command else every_route(),
     )
-    app.state.allowed_methods = AllowedMethods(_routers())
+    app.state.allowed_methods = AllowedMethods(routers)
     install_error_handlers(app)
-    install_openapi(app, layouts.LayoutBody)
+    install_openapi(app, _read_by_hand)
     _guard(app, settings, metrics, body_patience_s, is_asked=asks_who(settings) and not of_one_command)
     return app
 
 
-def _routers() -> list[tuple[str, APIRouter]]:
-    return [
-        ("", health.pages),
-        ("", login.router),
-        ("", provider_login.router),
-        *((PREFIX, noun.router) for noun in ROUTERS),
-    ]
+def _answered() -> Mapping[str, JobKind]:
+    from glovecal_service.questions.catalogue import ANSWERED  # slow to load, and most commands have no job
+
+    return ANSWERED
 
 
-@cache
-def _routes() -> list[BaseRoute]:
-    """Of all applications in a process: a command makes one, and what a route takes is worked out slowly."""
-    every = APIRouter()
-    for prefix, router in _routers():
-        every.include_router(router, prefix=prefix)
-    return every.routes
+def _read_by_hand() -> list[type[BaseModel]]:
+    from glovecal_service.rest.glove.layouts import LayoutBody
+
+    return [LayoutBody]
 
 
 async def _sweep_hourly(store: Store, settings: Settings) -> None:

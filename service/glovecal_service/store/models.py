@@ -12,7 +12,6 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.functions import FunctionElement
 from sqlalchemy.types import NullType
 
-from glovecal_models.calibration.artifact import read_manifest
 from glovecal_models.errors import BadInput, DamagedArtifact
 from glovecal_models.hand.rotations import HANDS, Handedness, is_of_hand, known_hand
 from glovecal_models.names import check_identifier
@@ -297,6 +296,8 @@ def other_remedies(model: ModelRecord, *, can_roll_back: bool) -> str:
 
 def _effect_names(artifact: bytes) -> dict[str, list[str]]:
     """So that models can be listed without opening their artifacts."""
+    from glovecal_models.calibration.artifact import read_manifest  # slow to load, and seldom needed
+
     try:
         effects = read_manifest(artifact).get("effects")
     except DamagedArtifact:

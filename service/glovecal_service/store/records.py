@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from glovecal_models.calibration.training_settings import OF_SHAPES
+from glovecal_models.calibration.methods import OF_SHAPES
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HANDS, Handedness, is_of_hand, known_hand
 from glovecal_models.hand.skeleton import Palm, Skeleton, hand_skeleton

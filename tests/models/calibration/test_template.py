@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from glovecal_models.calibration.artifact import dump, load
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.template import PALM_SHARE
 from glovecal_models.calibration.training import train
 from glovecal_models.calibration.training_plan import plan_training
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import NotTrainable
 from glovecal_models.layout import Layout
 from glovecal_models.regression.linear_regressor import LinearRegressor, fit_beside, gains_of, line_of

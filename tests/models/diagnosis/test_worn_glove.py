@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.diagnosis.worn_glove import worn_glove_findings
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import segments

@@ -11,10 +11,11 @@ import pytest
 from asked_session import RECORDING, asked_session
 
 from glovecal_models.calibration.artifact import dump, load
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import BY_RULE, GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import Cancelled, LayoutMismatch, NotTrainable
 from glovecal_models.hand.dimensions import HandDimensions
 from glovecal_models.hand.rotations import HAND_ROTATIONS

@@ -13,7 +13,7 @@ from glovecal_client.capture.command import main as capture_alone
 from glovecal_client.capture.cyberglove.device import CyberGlove
 from glovecal_client.capture.replay import ReplayDevice
 from glovecal_client.session import DEFAULT_ENDPOINT
-from glovecal_models.calibration.training_settings import METHODS
+from glovecal_models.calibration.methods import METHODS
 from glovecal_service.cli.command import some_verbs
 from glovecal_service.cli.terminal import options
 from glovecal_service.questions.train import TrainingRequest

@@ -100,7 +100,7 @@ class Service:
             worker_port=port, host="127.0.0.1", workers_idle_s=workers_idle_s,
         )  # fmt: skip
         self.store = Store.open(self.settings)
-        self.dispatcher = Dispatcher(self.store, self.settings, {"count": CountingJob()})
+        self.dispatcher = Dispatcher(self.store, self.settings, lambda: {"count": CountingJob()})
         self.dispatcher.start()
 
     def count(self, ledger: Path, *numbers: int, seconds: float = 0.0) -> JobRecord:

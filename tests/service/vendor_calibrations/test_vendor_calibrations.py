@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glovecal_models.calibration.artifact import dump, load
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.predictor import GlovePredictor
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.errors import BadInput
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.protocol import evaluation_segment

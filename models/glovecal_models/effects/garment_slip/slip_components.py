@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from glovecal_models.effects.base.power_on import POWER_ON, evenly_since_power_on
 from glovecal_models.effects.garment_slip.slip_rate import MEAN_S
@@ -189,6 +188,8 @@ class _Likelihood:
         self, most: Mapping[Name, float], start: Mapping[Name, float] | None = None
     ) -> tuple[float, dict[Name, float]]:
         """The log likelihood and the logs of the variances, each at most ``most``."""
+        from scipy.optimize import minimize  # slow to load, and each service loads all effects
+
         bounds = [(LEAST_LOG, max(most[name], LEAST_LOG)) for name in self._names]
         begin = [START_LOG if start is None else start[name] for name in self._names]
         found = minimize(

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
 from glovecal_models.calibration.training import train
-from glovecal_models.calibration.training_settings import Method, TrainingSettings
+from glovecal_models.calibration.training_settings import TrainingSettings
 from glovecal_models.comparison.answer import RotationErrors
 from glovecal_models.comparison.residuals import Residuals, residuals
 from glovecal_models.improvement.fall.answer import FallStep, FloorBand, fall_chart

@@ -104,7 +104,7 @@ def _choose(
     method: str,
 ) -> tuple[list[str], str]:
     """Ids of the takes to train on, and their layout."""
-    from glovecal_models.calibration.training_settings import OF_SHAPES
+    from glovecal_models.calibration.methods import OF_SHAPES
 
     service.get(f"/subjects/{subject}")
     rows = stored_takes(service, subject=subject)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import errno
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
@@ -138,10 +139,14 @@ class AllowedMethods:
     The routes with the fewest parameters are the ones its path means: ``models/train`` is no model's id.
     """
 
-    def __init__(self, routers: Iterable[tuple[str, APIRouter]]) -> None:
-        self._routes = [
+    def __init__(self, routers: Callable[[], Iterable[tuple[str, APIRouter]]]) -> None:
+        self._routers = routers
+
+    @cached_property
+    def _routes(self) -> list[tuple[re.Pattern[str], frozenset[str]]]:
+        return [
             (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
-            for prefix, router in routers
+            for prefix, router in self._routers()
             for route in router.routes
             if isinstance(route, Route)
         ]

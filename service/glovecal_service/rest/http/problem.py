@@ -6,7 +6,7 @@ Lists go on without damaged rows; each of those is named in a ``Warning`` header
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any, TypeVar
 
@@ -141,7 +141,7 @@ def change_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return problems(*_CHANGING, *statuses)
 
 
-def install_openapi(app: FastAPI, *bodies: type[BaseModel]) -> None:
+def install_openapi(app: FastAPI, bodies: Callable[[], Iterable[type[BaseModel]]]) -> None:
     """Add the components that are referred to by hand: ``Problem``, and ``bodies`` that are read by hand."""
 
     def openapi() -> dict[str, Any]:
@@ -155,7 +155,7 @@ def install_openapi(app: FastAPI, *bodies: type[BaseModel]) -> None:
             )
             schemas = schema.setdefault("components", {}).setdefault("schemas", {})
             models: dict[str, type[BaseModel]] = {"Problem": ProblemDocument}
-            models |= {body.__name__: body for body in bodies}
+            models |= {body.__name__: body for body in bodies()}
             for name, model in models.items():
                 component = model.model_json_schema(ref_template="#/components/schemas/{model}")
                 schemas.update(component.pop("$defs", {}))

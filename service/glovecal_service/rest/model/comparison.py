@@ -10,8 +10,8 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from glovecal_models.calibration.explanation import chosen_rotations
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import Method
 from glovecal_models.comparison.compare import summed_up
 from glovecal_models.comparison.delay_curve import live_and_delayed
 from glovecal_models.comparison.noise_floor import rotation_noise

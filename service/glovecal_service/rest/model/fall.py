@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from fastapi import APIRouter
 
+from glovecal_models.calibration.methods import Method
 from glovecal_models.calibration.model import CalibrationModel
-from glovecal_models.calibration.training_settings import Method
 from glovecal_models.comparison.noise_floor import takes_noise
 from glovecal_models.errors import NotTrainable
 from glovecal_models.improvement.fall.answer import ErrorFall, FallStep, FloorBand
