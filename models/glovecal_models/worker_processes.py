@@ -52,6 +52,7 @@ _PROGRAM = (
     "from glovecal_models.worker_processes import serve; serve(requests)"
 )
 _LENGTH_BYTES = 8
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def pin_blas_to_one_thread() -> None:
@@ -59,8 +60,8 @@ def pin_blas_to_one_thread() -> None:
     global _limits
     if _limits is None:
         import numpy.linalg  # noqa: F401  the pools exist only once the libraries are loaded
-        import scipy.linalg  # noqa: F401
 
+        os.environ.update(dict.fromkeys(_THREADS, "1"))  # for what is loaded later, as scipy with its own
         _limits = threadpool_limits(limits=1)
 
 

@@ -190,3 +190,24 @@ def test_what_cannot_be_sent_is_an_error_and_no_hang(work, task) -> None:
 def test_a_worker_has_one_blas_thread() -> None:
     threads = "{pool['num_threads'] for pool in __import__('threadpoolctl').threadpool_info()}"
     assert results(eval, [threads] * 2) == {0: {1}, 1: {1}}
+
+
+PINNED = """
+import os
+from glovecal_models.worker_processes import pin_blas_to_one_thread
+pin_blas_to_one_thread()
+import scipy.linalg
+from threadpoolctl import threadpool_info
+print(*{pool["num_threads"] for pool in threadpool_info()}, len(threadpool_info()))
+"""
+
+
+@pytest.mark.skipif(os.cpu_count() == 1, reason="every library has one thread on one core")
+def test_libraries_loaded_later_have_one_thread_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    with script(PINNED) as process:
+        printed, _ = process.communicate(timeout=60)
+    threads, libraries = printed.split()
+    assert int(threads) == 1
+    assert int(libraries) >= 2, "scipy brings a library of its own"
