@@ -22,7 +22,11 @@ new MutationObserver(again).observe(document.body, { childList: true, subtree: t
 again();
 
 function showPage() {
-  document.querySelector(".studio-nav [aria-current]")?.scrollIntoView({ inline: "center", block: "nearest" });
+  const here = document.querySelector(".studio-nav [aria-current]");
+  if (!here) return;
+  // not scrollIntoView: browsers (Chromium 150) go on from there with Tab, past the link to the content
+  const nav = here.closest(".studio-nav"), [row, link] = [nav, here].map((item) => item.getBoundingClientRect());
+  nav.scrollLeft += link.left + link.width / 2 - row.left - row.width / 2;
 }
 
 addEventListener("load", showPage);
