@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from glovecal_models.calibration.people_prior import PeoplePrior, people_prior
+from typing import TYPE_CHECKING
+
 from glovecal_models.hand.rotations import Handedness
 from glovecal_models.takes.take import Take
 from glovecal_service.store import Store
+
+if TYPE_CHECKING:
+    from glovecal_models.calibration.people_prior import PeoplePrior
 
 MOST_TAKES = 100
 """The newest: somebody waits meanwhile, some seconds with so many (500 took 21 s and 470 MB)."""
@@ -16,6 +20,8 @@ def prior_of_people(
 ) -> PeoplePrior:
     """Of everybody with takes that have a reference, but ``besides``; of ``hand``, and of takes of which
     nobody said it. Raises NotFound, NotTrainable."""
+    from glovecal_models.calibration.people_prior import people_prior  # slow to load, and seldom asked for
+
     parsed = store.layouts.get(layout)
     records = [
         take

@@ -112,7 +112,7 @@ def create_app(
     )
     app.state.allowed_methods = AllowedMethods(routers)
     install_error_handlers(app)
-    install_openapi(app, _read_by_hand)
+    install_openapi(app, every_route, _read_by_hand)
     _guard(app, settings, metrics, body_patience_s, is_asked=asks_who(settings) and not of_one_command)
     return app
 

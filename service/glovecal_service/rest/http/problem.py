@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from fastapi import FastAPI, Response
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel, ConfigDict, Field
+from starlette.routing import BaseRoute
 
 from glovecal_service.plain import plain, plain_text
 from glovecal_service.store.errors import DamagedRows
@@ -141,8 +142,13 @@ def change_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return problems(*_CHANGING, *statuses)
 
 
-def install_openapi(app: FastAPI, bodies: Callable[[], Iterable[type[BaseModel]]]) -> None:
-    """Add the components that are referred to by hand: ``Problem``, and ``bodies`` that are read by hand."""
+def install_openapi(
+    app: FastAPI,
+    routes: Callable[[], list[BaseRoute]],
+    bodies: Callable[[], Iterable[type[BaseModel]]],
+) -> None:
+    """Of all ``routes``, with the components that are referred to by hand: ``Problem``, and ``bodies`` that are
+    read by hand."""
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
@@ -150,7 +156,7 @@ def install_openapi(app: FastAPI, bodies: Callable[[], Iterable[type[BaseModel]]
                 title=app.title,
                 version=app.version,
                 description=app.description,
-                routes=app.routes,
+                routes=routes(),
                 tags=app.openapi_tags,
             )
             schemas = schema.setdefault("components", {}).setdefault("schemas", {})
