@@ -47,7 +47,7 @@ def test_a_service_does_not_read_its_own_source_when_it_starts():
     assert _printed_by(READ) == ""
 
 
-@pytest.mark.parametrize("verb", ["subject list", "take list", "glove list", "person list", "key list"])
+@pytest.mark.parametrize("verb", ["subject list", "take list", "person list", "key list", "audit list"])
 def test_a_command_that_opens_no_model_loads_nothing_of_them(verb: str, tmp_path: Path) -> None:
     """Without a service, on a data folder of its own."""
     printed = _printed_by(COMMAND, *verb.split(), folder=tmp_path)

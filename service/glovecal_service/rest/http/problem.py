@@ -147,8 +147,8 @@ def install_openapi(
     routes: Callable[[], list[BaseRoute]],
     bodies: Callable[[], Iterable[type[BaseModel]]],
 ) -> None:
-    """Of all ``routes``, with the components that are referred to by hand: ``Problem``, and ``bodies`` that are
-    read by hand."""
+    """Of all ``routes``, with the components that are referred to by hand: ``Problem``, and ``bodies`` that
+    are read by hand."""
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
