@@ -31,13 +31,13 @@ NOUNS: Mapping[str, tuple[str, ...]] = {
     "simulated-glove": ("first_run.simulated_glove",),
     "hidden-effects": ("first_run.hidden_effects",),
     "takes": (
-        "take.takes",
-        "take.reference",
         "take.clocks",
         "take.hands",
         "take.series",
         "take.session_drift",
         "take.table_import",
+        "take.takes",
+        "take.reference",
         "take.reference_import",
         "asking",
     ),
@@ -45,16 +45,16 @@ NOUNS: Mapping[str, tuple[str, ...]] = {
     "motion": ("take.motion",),
     "videos": ("take.videos",),
     "models": (
-        "model.models",
         "model.model_import",
         "model.vendor_calibrations",
-        "model.predictions",
         "model.refinement",
-        "model.residuals",
+        "model.models",
+        "model.predictions",
         "model.comparison",
-        "model.fall",
         "sampling.next_steps",
+        "model.residuals",
         "effect.picture",
+        "model.fall",
         "effect.trial",
         "asking",
     ),
@@ -69,7 +69,8 @@ NOUNS: Mapping[str, tuple[str, ...]] = {
     "audit": ("access.audit",),
 }
 """Modules below this package, each with a ``router``. Those of one word are loaded one after another until
-one of them answers: what most commands ask for comes first, what loads most last."""
+one of them answers, so that a word in an address comes before what takes any word in its place; what loads
+most comes last."""
 
 
 def routers() -> list[tuple[str, APIRouter]]:

@@ -12,13 +12,14 @@ from glovecal_service.rest.http.observation import PREFIX
 from glovecal_service.rest.routes import NOUNS, add_answering, routers
 
 
-def asked_scopes() -> Iterator[Scope]:
-    """One request of each route below ``/v1``."""
+def asked() -> Iterator[tuple[Scope, object]]:
+    """One request of each route below ``/v1``, and the function that is to answer it."""
     for prefix, router in routers():
-        for route in router.routes if prefix else ():
-            path = prefix + getattr(route, "path").format_map(Anything())  # noqa: B009
-            for method in sorted(getattr(route, "methods")):  # noqa: B009
-                yield {"type": "http", "method": method, "path": path, "root_path": "", "headers": []}
+        for route in map(vars, router.routes if prefix else ()):
+            path = prefix + route["path"].format_map(Anything())
+            for method in sorted(route["methods"]):
+                scope = {"type": "http", "method": method, "path": path, "root_path": "", "headers": []}
+                yield scope, route["endpoint"]
 
 
 class Anything(dict[str, str]):
@@ -41,14 +42,16 @@ def bare() -> FastAPI:
     return FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
 
 
-def test_each_request_is_answered_by_the_same() -> None:
+def test_each_route_answers_what_is_asked_of_it() -> None:
+    """None is hidden by one before it, such as ``takes/session-drift`` by ``takes/{id}``."""
     whole = [router for prefix, router in routers() if prefix]
-    scopes = list(asked_scopes())
-    assert len({answering(whole, scope) for scope in scopes}) > 100
-    for scope in scopes:
+    requests = list(asked())
+    assert len(requests) > 100
+    for scope, endpoint in requests:
         growing = bare()
         add_answering(growing, scope)
-        assert answering(given(growing), scope) == answering(whole, scope) is not None, scope
+        assert answering(whole, scope) is endpoint, scope
+        assert answering(given(growing), scope) is endpoint, scope
 
 
 def test_a_request_gives_no_more_than_it_asks_for() -> None:
