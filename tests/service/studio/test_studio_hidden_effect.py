@@ -133,9 +133,12 @@ def test_the_missing_effect_is_seen_named_added_and_live(
         re.compile(rf"{CAUSE} on .* explains \d+ % of the squared error of these sensors")
     )
     expect(main.get_by_role("progressbar")).to_be_hidden()
+    expect(main).not_to_contain_text("Drawing")  # until then what lies below a picture goes on moving
     picture("2-diagnose")
 
-    person.choose(main.get_by_role("checkbox", name="Live poses come from it"))
+    goes_live = main.get_by_role("checkbox", name="Live poses come from it")
+    person.choose(goes_live)
+    expect(goes_live).to_be_checked()
     person.choose(add)
     fall = main.get_by_role("link", name="See the error fall").last
     fall.wait_for()
