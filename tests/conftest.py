@@ -42,7 +42,8 @@ for _part in ("connect", "read", "write", "pool"):
     setattr(inspect.signature(httpx.Client).parameters["timeout"].default, _part, 120.0)
 
 # tests ask thousands of times, and reading this computer's certificates takes longer than most answers
-_transport.create_ssl_context = cache(_transport.create_ssl_context)
+_of_httpx = vars(_transport)
+_of_httpx["create_ssl_context"] = cache(_of_httpx["create_ssl_context"])
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 REQUIRE_EVERYTHING = "GLOVECAL_REQUIRE_EVERYTHING"

@@ -29,7 +29,7 @@ class Anything(dict[str, str]):
 
 def answering(asked: Iterable[APIRouter], scope: Scope) -> object:
     """The function that is called, of the first route that takes the request; None where none does."""
-    below = scope | {"path": scope["path"].removeprefix(PREFIX)}
+    below = {**scope, "path": scope["path"].removeprefix(PREFIX)}
     every = (route for router in asked for route in router.routes)
     return next((vars(route)["endpoint"] for route in every if route.matches(below)[0] is Match.FULL), None)
 
