@@ -42,7 +42,7 @@ for _part in ("connect", "read", "write", "pool"):
     setattr(inspect.signature(httpx.Client).parameters["timeout"].default, _part, 120.0)
 
 # tests ask thousands of times, and reading this computer's certificates takes longer than most answers
-_of_httpx = vars(_transport)
+_of_httpx = _transport.__dict__
 _of_httpx["create_ssl_context"] = cache(_of_httpx["create_ssl_context"])
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
