@@ -41,6 +41,7 @@ def run_command(command: Callable[[], int | None]) -> NoReturn:
     The code is 1 where the command went well and its answer was lost.
     """
     guard_streams()
+    atexit.register(gc.freeze)  # else Python looks through all there is for cycles before it ends
     code: Any = ANSWER_LOST
     try:
         code = command()
@@ -50,7 +51,6 @@ def run_command(command: Callable[[], int | None]) -> NoReturn:
         pass
     finally:
         delivered = _flush()
-    gc.freeze()  # or Python looks through all there is for cycles before it ends: half a second
     sys.exit(code or (0 if delivered else ANSWER_LOST))
 
 

@@ -94,7 +94,7 @@ class RestClient:
             base_url=f"{self.url}/v1",
             transport=transport,
             timeout=httpx.Timeout(patience_s, connect=5.0),
-            verify=_shown_by_services(parts.scheme, self._member),
+            verify=_trusted_certificates(parts.scheme, self._member),
             trust_env=False,
             headers={} if key is None else {"Authorization": f"Bearer {key}"},
         )
@@ -365,8 +365,8 @@ def _refusal(response: httpx.Response) -> ServiceError:
     return Refused(response.status_code, title, detail, problem)
 
 
-def _shown_by_services(scheme: str, member: Member | None) -> ssl.SSLContext | bool:
-    """Which certificates are trusted. Those of this computer take longer to read than most answers."""
+def _trusted_certificates(scheme: str, member: Member | None) -> ssl.SSLContext | bool:
+    """None over ``http``: those of this computer take longer to read than most answers."""
     if member is not None:
         return client_context(member)
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if scheme == "http" else True

@@ -30,13 +30,15 @@ def _is_model(start: bytes) -> bool:
 
 
 def _is_calibration(start: bytes) -> bool:
-    from glovecal_service.exports.vendor_calibrations import formats  # slow to load, as below
+    from glovecal_service.exports.vendor_calibrations import (
+        formats,  # slow to load, and lists of takes load this
+    )
 
     return formats.recognised(formats.as_text(start)) is not None
 
 
 def _is_motion(start: bytes) -> bool:
-    from glovecal_service.exports.motion_files import formats  # and every list of takes loads this file
+    from glovecal_service.exports.motion_files import formats  # as above
 
     return formats.recognised(start) is not None
 

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from itertools import chain
 from multiprocessing import forkserver, reduction
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -32,7 +31,7 @@ from glovecal_models.layout import Layout
 from glovecal_models.takes.take import Take
 from glovecal_service.jobs.workers import CONFIG, IMPORTED_ONCE
 from glovecal_service.operating_system import FORKS
-from glovecal_service.rest.routes import NOUNS
+from glovecal_service.rest.routes import MODULES
 from glovecal_service.serve import Lifeline, Work, run_part
 from glovecal_service.settings import Settings
 from glovecal_service.store import Store
@@ -71,7 +70,7 @@ def eventually(condition: Callable[[], Value | None], what: str, deadline_s: flo
 PARTS = [
     "glovecal_service.serve", "glovecal_service.realtime.process", "glovecal_service.recorder.recorder",
     "glovecal_service.rest.app", "glovecal_service.studio.mount",
-    *(f"glovecal_service.rest.{name}" for name in dict.fromkeys(chain(*NOUNS.values()))),
+    *(f"glovecal_service.rest.{name}" for name in MODULES),
 ]  # fmt: skip
 _OF_WORKERS = "distributed.nanny.pre-spawn-environ."
 

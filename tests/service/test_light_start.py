@@ -16,7 +16,7 @@ routers()
 print(*({SLOW | {"nicegui"}} & set(sys.modules)))
 """
 READ = """
-import linecache, sys
+import linecache, sys, glovecal_service.rest.app
 from glovecal_service.rest.routes import routers
 routers()
 ours = {module.__file__ for name, module in sys.modules.items() if name.startswith("glovecal_")}

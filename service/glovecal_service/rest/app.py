@@ -59,7 +59,7 @@ def create_app(
     """The application; its lifespan opens the store (unless given) and runs the job dispatcher.
 
     ``of_one_command``: it lives in the process of a single command, as ``Dispatcher`` is told, nobody but who
-    has the data folder reaches it, and it has no routes until ``add_answering`` gives it some.
+    has the data folder reaches it, and it has no routes until ``Growing`` gives it some.
 
     On loopback whoever reaches the port may do everything, and ``RequestGuard`` keeps pages of other sites
     out; beyond it ``AccessGuard`` asks who it is.

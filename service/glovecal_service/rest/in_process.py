@@ -9,12 +9,11 @@ from contextlib import contextmanager, suppress
 import anyio
 import httpx
 from anyio.from_thread import BlockingPortal, start_blocking_portal
-from fastapi import FastAPI
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Message
 
 from glovecal_client.rest import RestClient
 from glovecal_service.rest.app import create_app
-from glovecal_service.rest.routes import add_answering
+from glovecal_service.rest.routes import Growing
 from glovecal_service.settings import Settings
 
 URL = "http://localhost"
@@ -32,17 +31,9 @@ def in_process_client(settings: Settings) -> Iterator[RestClient]:
     with (
         start_blocking_portal() as portal,
         portal.wrap_async_context_manager(app.router.lifespan_context(app)),
-        RestClient(URL, transport=PortalTransport(_growing(app), portal), patience_s=3600.0) as client,
+        RestClient(URL, transport=PortalTransport(Growing(app), portal), patience_s=3600.0) as client,
     ):
         yield client
-
-
-def _growing(app: FastAPI) -> ASGIApp:
-    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
-        add_answering(app, scope)
-        await app(scope, receive, send)
-
-    return answer
 
 
 class PortalTransport(httpx.BaseTransport):

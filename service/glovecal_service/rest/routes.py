@@ -10,7 +10,7 @@ from itertools import chain
 
 from fastapi import APIRouter, FastAPI
 from starlette.routing import BaseRoute, Match
-from starlette.types import Scope
+from starlette.types import Receive, Scope, Send
 
 from glovecal_service.rest.http.observation import PREFIX
 
@@ -73,13 +73,17 @@ one of them answers, so that a word in an address comes before what takes any wo
 most comes last."""
 
 
+MODULES = tuple(dict.fromkeys(chain(*NOUNS.values())))
+"""Each once."""
+
+
 def routers() -> list[tuple[str, APIRouter]]:
     """All there are, each with the beginning of its addresses."""
     from glovecal_service.rest.access import login, provider_login
     from glovecal_service.rest.http import health
 
     pages = [("", router) for router in (health.pages, login.router, provider_login.router)]
-    return [*pages, *((PREFIX, _router(name)) for name in dict.fromkeys(chain(*NOUNS.values())))]
+    return [*pages, *((PREFIX, _router(name)) for name in MODULES)]
 
 
 @cache
@@ -91,13 +95,26 @@ def every_route() -> list[BaseRoute]:
     return every.routes
 
 
-def add_answering(app: FastAPI, scope: Scope) -> None:
-    """Give ``app`` what answers a request, unless it has that."""
-    noun = f"{scope['path']}/".removeprefix(f"{PREFIX}/").partition("/")[0]
-    for name in NOUNS.get(noun, ()):
-        if any(route.matches(scope)[0] is Match.FULL for route in app.router.routes):
-            return
-        app.include_router(_router(name), prefix=PREFIX)
+class Growing:
+    """An application without routes, which is given what answers a request when one comes."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self.app = app
+        self.given: list[str] = []
+        """Of ``MODULES``."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self.grow(scope)
+        await self.app(scope, receive, send)
+
+    def grow(self, scope: Scope) -> None:
+        noun = f"{scope['path']}/".removeprefix(f"{PREFIX}/").partition("/")[0]
+        for name in NOUNS.get(noun, ()):
+            if any(route.matches(scope)[0] is Match.FULL for route in self.app.router.routes):
+                return
+            if name not in self.given:
+                self.app.include_router(_router(name), prefix=PREFIX)
+                self.given.append(name)
 
 
 def _router(name: str) -> APIRouter:

@@ -9,7 +9,7 @@ from starlette.routing import Match
 from starlette.types import Scope
 
 from glovecal_service.rest.http.observation import PREFIX
-from glovecal_service.rest.routes import NOUNS, add_answering, routers
+from glovecal_service.rest.routes import MODULES, NOUNS, Growing, routers
 
 
 def asked() -> Iterator[tuple[Scope, object]]:
@@ -34,12 +34,12 @@ def answering(asked: Iterable[APIRouter], scope: Scope) -> object:
     return next((vars(route)["endpoint"] for route in every if route.matches(below)[0] is Match.FULL), None)
 
 
-def given(app: FastAPI) -> list[APIRouter]:
-    return [vars(each)["original_router"] for each in app.router.routes]
+def growing() -> Growing:
+    return Growing(FastAPI(openapi_url=None, docs_url=None, redoc_url=None))
 
 
-def bare() -> FastAPI:
-    return FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+def routers_of(app: Growing) -> list[APIRouter]:
+    return [vars(each)["original_router"] for each in app.app.router.routes]
 
 
 def test_each_route_answers_what_is_asked_of_it() -> None:
@@ -48,29 +48,32 @@ def test_each_route_answers_what_is_asked_of_it() -> None:
     requests = list(asked())
     assert len(requests) > 100
     for scope, endpoint in requests:
-        growing = bare()
-        add_answering(growing, scope)
+        app = growing()
+        app.grow(scope)
         assert answering(whole, scope) is endpoint, scope
-        assert answering(given(growing), scope) is endpoint, scope
+        assert answering(routers_of(app), scope) is endpoint, scope
 
 
 def test_a_request_gives_no_more_than_it_asks_for() -> None:
-    app = bare()
+    app = growing()
     scope = {"type": "http", "method": "GET", "path": f"{PREFIX}/takes", "root_path": "", "headers": []}
-    add_answering(app, scope)
-    once = given(app)
-    add_answering(app, scope)
-    add_answering(app, scope | {"path": f"{PREFIX}/no-such-word"})
-    assert given(app) == once
-    assert answering(once, scope | {"method": "POST", "path": f"{PREFIX}/takes/examination"}) is None
+    app.grow(scope)
+    app.grow(scope)
+    app.grow({**scope, "path": f"{PREFIX}/no-such-word"})
+    assert app.given == ["take.session_drift", "take.takes"]
+
+
+def test_nothing_is_given_twice() -> None:
+    app = growing()
+    for scope, _ in asked():
+        app.grow(scope)
+        app.grow({**scope, "method": "BREW"})
+    assert sorted(app.given) == sorted(MODULES)
+    assert len(routers_of(app)) == len(MODULES)
 
 
 def test_every_route_begins_with_the_word_it_is_listed_under() -> None:
-    listed = {noun for noun, names in NOUNS.items() if names}
     there = {
-        getattr(route, "path").split("/")[1]  # noqa: B009
-        for prefix, router in routers()
-        for route in router.routes
-        if prefix
+        vars(route)["path"].split("/")[1] for prefix, router in routers() for route in router.routes if prefix
     }
-    assert there == listed
+    assert there == set(NOUNS)
