@@ -32,6 +32,8 @@ from glovecal_models.simulation.simulated_hand import DRIVEN, KEY_POSES, LONG_FI
 WANDER_DEG = 0.4
 TREMOR_DEG = 0.12
 """Amplitudes of each of the two slow and three fast waves of a hand that tries to be still."""
+PACE_S = 10.0
+"""In which swings that change their speed get fast and slow again."""
 WIDGET_DEG = (0.0, 10.0, 20.0, 30.0)
 GAPS = ("IM_ABD", "MR_ABD", "RP_ABD")
 CROSS_COUPLE_S, THUMB_S, WRIST_S, FREE_S = 4.0, 6.5, 4.0, 5.0
@@ -125,9 +127,14 @@ class Sweep:
     phase: np.ndarray
     duration_s: float
     blend_s: float = 0.4
+    slowest_share: float = 1.0
+    """Of their speed, at which swings begin and to which they slow down again in each ``PACE_S``."""
 
     def driven(self, time_s: np.ndarray) -> np.ndarray:
-        angle = 2 * np.pi * self.speed_hz * time_s[:, None] + self.phase
+        """Shape (N, len(DRIVEN)), degrees."""
+        middle, turn = (1 + self.slowest_share) / 2, 2 * np.pi / PACE_S
+        gone_s = middle * time_s - (1 - middle) * np.sin(turn * time_s) / turn
+        angle = 2 * np.pi * self.speed_hz * gone_s[:, None] + self.phase
         swing = self.low + (self.high - self.low) * (1 - np.cos(angle)) / 2
         share = np.minimum(time_s, self.duration_s - time_s) / self.blend_s
         return self.start + minimum_jerk(share)[:, None] * (swing - self.start)

@@ -6,9 +6,9 @@ never recorded, but sensors remember it) and ends after the last (a clock may be
 How the hand moves in each take of a simulated session, and before it.
 
 Natural motion takes the postures of ``free_motion`` at the pace of everyday use (near 40 degrees a second
-RMS, with holds). The others are takes made to tell causes apart: fast oscillation, ramps at two speeds with
-inner loops and holds, one finger at a time, a palm that is cupped while the fingers keep still, repeated
-poses, a hand that lies still.
+RMS, with holds). The others are takes made to tell causes apart: swings that get fast and slow again, ramps
+at two speeds with inner loops and holds, one finger at a time, a palm that is cupped while the fingers keep
+still, repeated poses, a hand that lies still.
 """
 
 from __future__ import annotations
@@ -47,6 +47,9 @@ HOLD_S = (0.0, 0.0, 0.3, 0.8, 1.6)
 """Free motion (``free_motion``) is made for short lively takes; in long ones hands go slower and wait."""
 FAST_HZ = (2.0, 3.5)
 FAST_DEG = 25.0
+FAST_SLOWEST = 0.2
+"""Of that speed, with which swings begin and to which they slow down: while it stays the same, a gain looks
+like a filter."""
 RAMP_SPEED_RATIO = 3.0
 _RAMP_CORNERS = (0.05, 0.95, 0.3, 0.75, 0.2, 0.95, 0.05)
 """Shares of the range between which ramps run: a full loop with two inner loops."""
@@ -136,7 +139,9 @@ def _fast(duration_s: float, random: np.random.Generator) -> HandMotion:
         low[column], high[column] = middle[column] - amplitude, middle[column] + amplitude
         speed[column] = random.uniform(*FAST_HZ)
     phase = random.uniform(0, 2 * np.pi, len(DRIVEN))
-    return Sweep(middle, within_range(low), within_range(high), speed, phase, duration_s)
+    return Sweep(
+        middle, within_range(low), within_range(high), speed, phase, duration_s, slowest_share=FAST_SLOWEST
+    )
 
 
 def _ramps(duration_s: float, random: np.random.Generator) -> HandMotion:

@@ -158,8 +158,9 @@ NO_RELATIONS = Relations()
 
 FAST = Motion(
     "fast",
-    "Swing several fingers to and fro as fast as you comfortably can, 2 to 3.5 times a second, about 25"
-    " degrees wide; three times 30 s, with a rest between.",
+    "Swing several fingers to and fro, about 25 degrees wide: begin slowly, get as fast as you comfortably"
+    " can within five seconds (2 to 3.5 times a second), slow down again for five, and so on; three times"
+    " 30 s, with a rest between.",
     90,
     3,
 )

@@ -73,9 +73,10 @@ class ShiftComparison(DelayComparison):
 
     def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
         late_s = float(np.median(found.shapes[0]))
-        if motion == FAST:
-            return abs(late_s) >= FAST_DECIDES_S
         measured = next((take.glove_latency for take in takes if take.glove_latency is not None), None)
+        if motion == FAST:
+            # Without a lag the clock and the glove would be left, if taps cannot tell those.
+            return abs(late_s) >= FAST_DECIDES_S and (measured is not None or taps_decide(late_s, None))
         return motion != TAPS or taps_decide(late_s, measured)
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:

@@ -158,7 +158,7 @@ def _joint(
     used = list(problem.units(joint))
     tracks = [fine[take].track(joint, rows) for take, rows in used]
     own = np.concatenate([problem.signals[take].own[rows, joint] for take, rows in used])
-    slope = _slope(base, products.whole, own)
+    slope = base_slope(base, products.whole, own)
     left = target - orthogonal @ (orthogonal.T @ target)
     lengths = [len(rows) for _, rows in used]
     starts, ends = block_starts(lengths, block_rows), np.cumsum(lengths)
@@ -214,7 +214,7 @@ def squared_beside(
     return np.maximum(result, 0.0)
 
 
-def _slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
+def base_slope(base: np.ndarray, coefficients: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Of the base along the own angle, (N,): by a smooth curve through its values."""
     x = (own - own.mean()) / max(float(own.std()), 1e-9)
     powers = np.polynomial.polynomial.polyvander(x, 3)

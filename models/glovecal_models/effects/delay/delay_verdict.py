@@ -18,6 +18,7 @@ from glovecal_models.effects.base.assessment import over_joints
 from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.base.limits import SIGNIFICANCE_LIMITS, SignificanceLimits
 from glovecal_models.effects.delay.delay_grid import DelayErrors, DelayForm, delay_errors, short_delay_errors
+from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread
 from glovecal_models.takes.take import KnownLatency
 from glovecal_models.takes.tap_latency import usual_key
 
@@ -34,9 +35,12 @@ MEASURED_SE = 2.0
 """A measured latency and a delay of takes this many standard errors apart are two different times."""
 ASKED_SE = 3.0
 """Taps are asked for where the delay of takes is so many: it will hardly come out in between."""
-FAST_DECIDES_S = 0.02
-"""Shorter filters look like mere delays in fast motion too (simulated gloves: of 5 with 10 to 12 ms one
-became clear; of 19 with about 22 ms 17 within one take of 45 s)."""
+FAST_DECIDES_S = 0.01
+"""How a shorter delay spreads is as uncertain as the difference between its forms."""
+SPREAD_SE = 2.0
+"""Standard errors by which a form has to miss the spread that was found."""
+LEAST_OF_A_FILTER = 0.2
+"""More than this no mere delay has (25 simulated gloves that were late, or their clock: -0.40 to 0.02)."""
 STOP_SD_S = 0.003
 """Taps find the finger's stop 2 to 4 ms late (simulated)."""
 ACCOUNTS_FOR = {
@@ -135,7 +139,9 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
     """The delay to be named first, and all that remain possible; ``problem`` by the rows smoothed over."""
     usual = problem(SMOOTHING)
     grids = delay_errors(usual)
-    possible = possible_delays(grids, usual.limits, lambda: short_delay_errors(usual))
+    possible = possible_delays(
+        grids, usual.limits, lambda: short_delay_errors(usual), lambda late_s: delay_spread(usual, late_s)
+    )
     latency = usual.signals[0].glove_latency
     if latency is not None and {CLOCK, LATENCY} <= set(possible):
         possible = _told_by_latency(possible, common_delay(grids), latency)
@@ -146,9 +152,10 @@ def possible_delays(
     grids: Sequence[DelayErrors],
     limits: SignificanceLimits = SIGNIFICANCE_LIMITS,
     in_short_blocks: Callable[[], Sequence[DelayErrors]] | None = None,
+    spread_of: Callable[[float], DelaySpread | None] = lambda late_s: None,
 ) -> tuple[str, ...]:
     """The effects that these delays may come from, the likeliest first. ``in_short_blocks``: gives the same
-    errors for forms to be told apart by."""
+    errors for forms to be told apart by; ``spread_of``: how a delay of so many seconds spreads."""
     clear = limits.delay_clear_se
     clock = clock_choice(grids, limits)
     if np.median(clock.offset_s) < 0 or clock.within is not None:
@@ -165,6 +172,9 @@ def possible_delays(
         short = in_short_blocks()
         also = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
         kept = [form for form in kept if form in also] or kept
+    late_s = common_delay(grids).seconds
+    if len(kept) > 1 and late_s >= FAST_DECIDES_S:
+        kept = forms_spreading(kept, spread_of(late_s))
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
     # A filter may gain by what noise it takes away: while a mere delay is not ruled out, it comes first.
@@ -190,6 +200,20 @@ def forms_kept(
         if slope <= clear_se * error:
             kept.append(form)
     return kept
+
+
+def forms_spreading(kept: Sequence[DelayForm], found: DelaySpread | None) -> list[DelayForm]:
+    """Those of ``kept`` that the spread that was found does not rule out; all where it rules out all."""
+    if found is None:
+        return list(kept)
+    least, most = found.share - SPREAD_SE * found.se, found.share + SPREAD_SE * found.se
+    left = [
+        form
+        for form in kept
+        if found.of_form[form] <= max(most, LEAST_OF_A_FILTER)
+        and (least <= found.of_form[form] + LEAST_OF_A_FILTER or form == DelayForm.ONE_POLE)
+    ]
+    return left or list(kept)
 
 
 def _along(gain: np.ndarray, fast: np.ndarray) -> tuple[float, float]:

@@ -1,0 +1,96 @@
+"""Whether a delay spreads what it delays: swings that change their speed tell a filter from a mere delay.
+
+A short delay of mean time T whose answer to an impulse has the variance V differs from a mere delay by V / 2
+times the angle's second derivative. So V / T^2 tells the form, whatever it is: 0 of a mere delay, 1/3 of a
+moving average, 0.55 of two poles, 1 of one pole. It is measured by what one pole as late would leave beside a
+mere delay. While swings keep their speed that follows the angle, and a gain that is a little wrong looks like
+it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from glovecal_models.effects.base.assessment import block_starts
+from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.delay.delay_grid import SHORT_ROWS, base_slope
+from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
+
+SWINGS_PER_S = 5.0
+"""RMS speed of a joint that swings, over its standard deviation in the same rows: 0.8 Hz. Free motion of
+simulated hands has 1.6."""
+SWING_SHARE = 0.4
+"""Of a joint's usual deviation: less is trembling."""
+OF_ITS_OWN = 0.1
+"""Of the squares of what one pole would leave, that a gain, its change with the angle and a delay do not
+tell."""
+
+
+TRIED = (
+    DelayForm.PURE,
+    DelayForm.MOVING_AVERAGE,
+    DelayForm.DELAYED_WINDOW,
+    DelayForm.ONE_POLE,
+    DelayForm.TWO_POLES,
+)
+"""In the order in which cells are worked out."""
+ONE = TRIED.index(DelayForm.ONE_POLE) - 1
+"""Its place behind the mere delay."""
+
+
+@dataclass(frozen=True)
+class DelaySpread:
+    """Of the delay of some takes, in that of one pole as late."""
+
+    share: float
+    se: float
+    """Standard error, by blocks of a second."""
+    of_form: Mapping[DelayForm, float]
+    """What each form has in the same motion: for short delays V / T^2."""
+
+
+def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
+    """Of a delay of ``late_s``, by the rows in which joints swing; None where none do, or none change their
+    speed."""
+    steps = round(late_s / STEP_S)
+    if steps < 1:
+        return None
+    fine = [FineAngles.of(take.time_s, take.own) for take in problem.signals]
+    usual = np.concatenate([take.own for take in problem.signals]).std(axis=0)
+    cells = MovedCells.of(np.array(TRIED), np.full(len(TRIED), steps * STEP_S))
+    products, squares = [], []
+    for joint, of_joint in enumerate(problem.products):
+        for unit, (take, rows) in zip(of_joint.units, problem.units(joint), strict=True):
+            angle, time_s = problem.signals[take].own[rows, joint], problem.signals[take].time_s[rows]
+            if len(rows) < SHORT_ROWS or angle.std() < SWING_SHARE * usual[joint]:
+                continue
+            speed = np.gradient(angle, time_s)
+            if float(np.sqrt(np.mean(speed**2))) < SWINGS_PER_S * angle.std():
+                continue
+            slope = base_slope(unit.base, of_joint.whole, angle)
+            (moved,) = cells.of_tracks([fine[take].track(joint, rows)])
+            late, *others = *moved.read, *(moved.passed[0].T + moved.rested[0])
+            left = unit.target - unit.base @ of_joint.whole - slope * (late - angle)
+            spread = np.column_stack([slope * (other - late) for other in others])
+            about = (angle - angle.mean()) / angle.std()
+            known, _ = np.linalg.qr(
+                np.column_stack([np.ones_like(angle), slope * about, slope * about**2, slope * speed])
+            )
+            pole = spread[:, ONE]
+            own = pole - known @ (known.T @ pole)
+            if own @ own < OF_ITS_OWN * (pole @ pole):
+                continue
+            starts = block_starts([len(rows)], SHORT_ROWS)
+            products.append(np.add.reduceat(own * left, starts))
+            squares.append(np.add.reduceat(own[:, None] * spread, starts))
+    if not squares:
+        return None
+    along, forms = np.concatenate(products), np.concatenate(squares)
+    whole = float(forms[:, ONE].sum())
+    share = float(along.sum()) / whole
+    se = float(np.linalg.norm(along - share * forms[:, ONE])) / whole
+    of_form = dict(zip(TRIED, [0.0, *(forms.sum(axis=0) / whole).tolist()], strict=True))
+    return DelaySpread(share, se, of_form)

@@ -1,0 +1,116 @@
+"""How much a delay spreads tells a filter from a mere delay, where swings change their speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from glovecal_models.diagnosis.problem import DiagnosisProblem
+from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.delay.delay_grid import delay_errors
+from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread
+from glovecal_models.effects.delay.delay_verdict import common_delay, forms_spreading, possible_delays
+from glovecal_models.effects.delay.moved_angles import FIRST_POLE_SHARE, WINDOW_SHARE, DelayForm
+from glovecal_models.layout import Layout
+from glovecal_models.simulation import scene
+from glovecal_models.simulation.causes.form import Cause
+from glovecal_models.simulation.protocol import PACE_S, Sweep
+from glovecal_models.simulation.session import record_session
+from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+
+LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
+SPREAD = {
+    DelayForm.PURE: 0.0,
+    DelayForm.DELAYED_WINDOW: WINDOW_SHARE**2 / 3,
+    DelayForm.MOVING_AVERAGE: 1 / 3,
+    DelayForm.TWO_POLES: FIRST_POLE_SHARE**2 + (1 - FIRST_POLE_SHARE) ** 2,
+    DelayForm.ONE_POLE: 1.0,
+}
+"""The variance of each form's answer to an impulse, over the square of its mean."""
+
+
+def with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> Problem:
+    plan = SessionPlan(seed=seed, wearings=2, takes_per_wearing=3, take_s=25.0, rate_hz=60.0, bits=12)
+    session = record_session(plan, list(causes))
+    swings = [session.also("fast", 30.0, 1, repeat=number).take for number in range(count)]
+    return DiagnosisProblem.of([*session.takes, *swings], LAYOUT, False, ()).design()
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Problem:
+    return with_swings(11)
+
+
+def test_each_form_spreads_as_its_answer_to_an_impulse(healthy):
+    found = delay_spread(healthy, 0.01)
+    assert found is not None
+    for form, expected in SPREAD.items():
+        assert found.of_form[form] == pytest.approx(expected, abs=0.04), form
+
+
+@pytest.mark.parametrize(
+    ("cause", "possible", "ruled_out"),
+    [
+        (Cause("glove_latency", "transport", 0.65), DelayForm.PURE, DelayForm.MOVING_AVERAGE),
+        (Cause("clock_offset", "constant", 0.65), DelayForm.PURE, DelayForm.MOVING_AVERAGE),
+        (Cause("lag", "one_pole", 0.65), DelayForm.ONE_POLE, DelayForm.PURE),
+    ],
+)
+def test_a_filter_of_12_ms_is_told_from_a_mere_delay(cause, possible, ruled_out):
+    problem = with_swings(5, [cause])
+    late_s = common_delay(delay_errors(problem)).seconds
+    left = forms_spreading(list(DelayForm), delay_spread(problem, late_s))
+    assert possible in left
+    assert ruled_out not in left
+
+
+def test_swings_that_keep_their_speed_tell_nothing(monkeypatch):
+    monkeypatch.setattr(scene, "FAST_SLOWEST", 1.0)
+    assert delay_spread(with_swings(5), 0.012) is None
+
+
+def test_free_motion_and_no_delay_tell_nothing(healthy):
+    assert delay_spread(with_swings(5, count=0), 0.012) is None
+    assert delay_spread(healthy, 0.0) is None
+
+
+@pytest.mark.parametrize("share", [-0.5, 0.0, 0.33, 1.0, 6.0])
+def test_some_form_is_always_left(share):
+    found = DelaySpread(share, 0.01, SPREAD)
+    for form in DelayForm:
+        assert forms_spreading([form], found) == [form]
+    assert forms_spreading(list(DelayForm), None) == list(DelayForm)
+
+
+@pytest.mark.parametrize(
+    ("share", "left"), [(0.0, DelayForm.PURE), (1.0, DelayForm.ONE_POLE), (6.0, DelayForm.ONE_POLE)]
+)
+def test_a_form_that_spreads_otherwise_is_ruled_out(share, left):
+    assert forms_spreading([DelayForm.PURE, DelayForm.ONE_POLE], DelaySpread(share, 0.1, SPREAD)) == [left]
+
+
+def test_what_spreads_decides_only_between_forms_that_are_left(healthy):
+    grids = delay_errors(healthy)
+    asked = []
+
+    def spread_of(late_s: float) -> DelaySpread:
+        asked.append(late_s)
+        return DelaySpread(0.0, 0.01, SPREAD)
+
+    assert possible_delays(grids, spread_of=spread_of) == possible_delays(grids)
+    assert not asked  # no delay, nothing that could spread
+
+
+def test_swings_begin_slowly_and_come_to_their_speed_half_way():
+    start = np.zeros(1)
+    swing = Sweep(start, start - 1, start + 1, np.array([3.0]), np.zeros(1), 30.0, slowest_share=0.2)
+    even = Sweep(start, start - 1, start + 1, np.array([3.0]), np.zeros(1), 30.0)
+    time_s = np.arange(0.0, 30.0, 0.001)
+    turns = np.flatnonzero(np.diff(np.sign(swing.driven(time_s)[:, 0])))
+    hz = 0.5 / np.diff(time_s[turns])
+    at = time_s[turns[1:]] % PACE_S
+    assert hz[np.abs(at - PACE_S / 2) < 0.5].mean() == pytest.approx(3.0, rel=0.05)
+    assert hz[(at > 9.2) | (at < 0.8)].min() == pytest.approx(0.6, rel=0.35)
+    assert len(np.flatnonzero(np.diff(np.sign(even.driven(time_s)[:, 0])))) == pytest.approx(180, abs=3)
