@@ -54,23 +54,31 @@ class FurtherTakes:
     def _crossed(self, take_s: float) -> list[Take]:
         """One change at a time: another battery without switching off, full and half-empty in turn; the glove
         off and on without switching off; switched off and on without taking it off."""
-        is_full = self._last.supply_v > HALF_EMPTY_BATTERY_V[1]
-        volts = HALF_EMPTY_BATTERY_V if is_full else FULL_BATTERY_V
         return [
-            self._take(take_s, supply_v=self._random.uniform(*volts)),
+            self._take(take_s, supply_v=self._other_battery_v()),
             self._take(take_s, **self._put_on_anew()),
             self._take(take_s, power_on_s=self._random.uniform(4.0, 70.0)),
         ]
 
     def _in_other_air(self, take_s: float) -> list[Take]:
-        """Of a cool box, a plastic bag and a fan heater, in one wearing."""
+        """Of a cool box, a plastic bag and a fan heater, in one wearing, after another battery is put in, for
+        which the glove is switched off."""
         random = self._random
         airs = (
             AirChange(-random.uniform(4.0, 8.0), 0.0, AIR_S),
             AirChange(random.uniform(0.5, 1.5), random.uniform(15.0, 30.0), AIR_S),
             AirChange(random.uniform(4.0, 8.0), 0.0, AIR_S),
         )
-        return [self._take(take_s, AIR_S, air=air) for air in airs]
+        switched = {"supply_v": self._other_battery_v(), "power_on_s": AIR_S + random.uniform(4.0, 70.0)}
+        return [
+            self._take(take_s, AIR_S, air=air, **({} if number else switched))
+            for number, air in enumerate(airs)
+        ]
+
+    def _other_battery_v(self) -> float:
+        """Full where the last one was half-empty."""
+        is_full = self._last.supply_v > HALF_EMPTY_BATTERY_V[1]
+        return self._random.uniform(*(HALF_EMPTY_BATTERY_V if is_full else FULL_BATTERY_V))
 
     def _put_on_anew(self) -> dict[str, Any]:
         wearing = self._last.wearing + 1

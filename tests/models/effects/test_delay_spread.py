@@ -11,7 +11,7 @@ from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.delay.delay_grid import delay_errors
 from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread
-from glovecal_models.effects.delay.delay_verdict import common_delay, forms_spreading, possible_delays
+from glovecal_models.effects.delay.delay_verdict import common_delay, possible_delays
 from glovecal_models.effects.delay.moved_angles import FIRST_POLE_SHARE, WINDOW_SHARE, DelayForm
 from glovecal_models.layout import Layout
 from glovecal_models.simulation import scene
@@ -61,9 +61,10 @@ def test_each_form_spreads_as_its_answer_to_an_impulse(healthy):
 def test_a_filter_of_12_ms_is_told_from_a_mere_delay(cause, possible, ruled_out):
     problem = with_swings(5, [cause])
     late_s = common_delay(delay_errors(problem)).seconds
-    left = forms_spreading(list(DelayForm), delay_spread(problem, late_s))
-    assert possible in left
-    assert ruled_out not in left
+    found = delay_spread(problem, late_s)
+    assert found is not None
+    assert found.may_be(possible)
+    assert not found.may_be(ruled_out)
 
 
 def test_swings_that_keep_their_speed_tell_nothing(monkeypatch):
@@ -76,19 +77,24 @@ def test_free_motion_and_no_delay_tell_nothing(healthy):
     assert delay_spread(healthy, 0.0) is None
 
 
-@pytest.mark.parametrize("share", [-0.5, 0.0, 0.33, 1.0, 6.0])
-def test_some_form_is_always_left(share):
-    found = DelaySpread(share, 0.01, SPREAD)
-    for form in DelayForm:
-        assert forms_spreading([form], found) == [form]
-    assert forms_spreading(list(DelayForm), None) == list(DelayForm)
-
-
 @pytest.mark.parametrize(
-    ("share", "left"), [(0.0, DelayForm.PURE), (1.0, DelayForm.ONE_POLE), (6.0, DelayForm.ONE_POLE)]
+    ("share", "may_be"),
+    [
+        (-1.0, set()),  # it overshoots: none of the forms does
+        (0.0, {DelayForm.PURE, DelayForm.DELAYED_WINDOW}),
+        (0.4, {DelayForm.MOVING_AVERAGE}),
+        (1.0, {DelayForm.MOVING_AVERAGE, DelayForm.ONE_POLE}),  # as an average over two frames, too
+        (6.0, {DelayForm.ONE_POLE}),
+    ],
 )
-def test_a_form_that_spreads_otherwise_is_ruled_out(share, left):
-    assert forms_spreading([DelayForm.PURE, DelayForm.ONE_POLE], DelaySpread(share, 0.1, SPREAD)) == [left]
+def test_forms_that_spread_otherwise_are_ruled_out(share, may_be):
+    found = DelaySpread(share, 0.01, SPREAD)
+    assert {form for form in DelayForm if found.may_be(form)} == may_be
+    assert found.is_mere_delay == (share == 0.0)
+
+
+def test_what_is_uncertain_rules_nothing_out_but_the_impossible():
+    assert all(DelaySpread(0.5, 0.5, SPREAD).may_be(form) for form in DelayForm)
 
 
 def test_what_spreads_decides_only_between_forms_that_are_left(healthy):

@@ -16,7 +16,7 @@ import numpy as np
 
 from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.effects.base.comparison import Problem
-from glovecal_models.effects.delay.delay_grid import SHORT_ROWS, base_slope
+from glovecal_models.effects.delay.delay_grid import FILTERS, SHORT_ROWS, base_slope
 from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
 
 SWINGS_PER_S = 5.0
@@ -29,6 +29,11 @@ OF_ITS_OWN = 0.1
 tell."""
 
 
+CLEAR_SE = 2.0
+"""By so many standard errors a form has to miss what was found."""
+UNLIKE = 0.2
+"""And by so much: 25 simulated gloves that were late, or their clock, had -0.40 to 0.12 (2026-11-29). Beyond
+twice it below zero lies a sensor that overshoots, which is none of the forms."""
 TRIED = (
     DelayForm.PURE,
     DelayForm.MOVING_AVERAGE,
@@ -51,6 +56,19 @@ class DelaySpread:
     of_form: Mapping[DelayForm, float]
     """What each form has in the same motion: for short delays V / T^2."""
 
+    @property
+    def is_mere_delay(self) -> bool:
+        """Whether no filter is left."""
+        return self.may_be(DelayForm.PURE) and not any(map(self.may_be, FILTERS))
+
+    def may_be(self, form: DelayForm) -> bool:
+        """Whether what was found does not rule a form out."""
+        least, most = self.share - CLEAR_SE * self.se, self.share + CLEAR_SE * self.se
+        own = self.of_form[form]
+        # An average over two frames spreads as one pole does; sensors that answer faster one way spread more.
+        largest = {DelayForm.MOVING_AVERAGE: 1.0, DelayForm.ONE_POLE: np.inf}.get(form, own)
+        return own <= max(most, UNLIKE) and least <= largest + UNLIKE and most >= -2 * UNLIKE
+
 
 def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     """Of a delay of ``late_s``, by the rows in which joints swing; None where none do, or none change their
@@ -58,7 +76,7 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     steps = round(late_s / STEP_S)
     if steps < 1:
         return None
-    fine = [FineAngles.of(take.time_s, take.own) for take in problem.signals]
+    fine: dict[int, FineAngles] = {}
     usual = np.concatenate([take.own for take in problem.signals]).std(axis=0)
     cells = MovedCells.of(np.array(TRIED), np.full(len(TRIED), steps * STEP_S))
     products, squares = [], []
@@ -71,6 +89,8 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
             if float(np.sqrt(np.mean(speed**2))) < SWINGS_PER_S * angle.std():
                 continue
             slope = base_slope(unit.base, of_joint.whole, angle)
+            if take not in fine:
+                fine[take] = FineAngles.of(problem.signals[take].time_s, problem.signals[take].own)
             (moved,) = cells.of_tracks([fine[take].track(joint, rows)])
             late, *others = *moved.read, *(moved.passed[0].T + moved.rested[0])
             left = unit.target - unit.base @ of_joint.whole - slope * (late - angle)

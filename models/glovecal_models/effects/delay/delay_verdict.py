@@ -37,10 +37,6 @@ ASKED_SE = 3.0
 """Taps are asked for where the delay of takes is so many: it will hardly come out in between."""
 FAST_DECIDES_S = 0.01
 """How a shorter delay spreads is as uncertain as the difference between its forms."""
-SPREAD_SE = 2.0
-"""Standard errors by which a form has to miss the spread that was found."""
-LEAST_OF_A_FILTER = 0.2
-"""More than this no mere delay has (25 simulated gloves that were late, or their clock: -0.40 to 0.02)."""
 STOP_SD_S = 0.003
 """Taps find the finger's stop 2 to 4 ms late (simulated)."""
 ACCOUNTS_FOR = {
@@ -143,7 +139,7 @@ def first_delay(problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]
         grids, usual.limits, lambda: short_delay_errors(usual), lambda late_s: delay_spread(usual, late_s)
     )
     latency = usual.signals[0].glove_latency
-    if latency is not None and {CLOCK, LATENCY} <= set(possible):
+    if latency is not None and CLOCK in possible:
         possible = _told_by_latency(possible, common_delay(grids), latency)
     return possible[0], possible
 
@@ -165,16 +161,20 @@ def possible_delays(
         each_take = _over_joints(grids, clock.errors(grids)[0])
         if min(_score(errors, each_take) for errors in together.values()) > clear:
             return (CLOCK,)
+    late_s = common_delay(grids).seconds
+    spread = spread_of(late_s) if late_s >= FAST_DECIDES_S else None
     if _score(together[DelayForm.PURE], _apart(grids, DelayForm.PURE)) > APART_TIMES * clear:
-        return (LAG,)
+        # A glove that reads one sensor after another is late by another time at each.
+        return (LATENCY,) if spread is not None and spread.is_mere_delay else (LAG,)
     kept = forms_kept(grids, together, clear)
     if in_short_blocks and len(kept) > 1:
         short = in_short_blocks()
         also = forms_kept(short, {form: _together(short, form) for form in DelayForm}, clear)
         kept = [form for form in kept if form in also] or kept
-    late_s = common_delay(grids).seconds
-    if len(kept) > 1 and late_s >= FAST_DECIDES_S:
-        kept = forms_spreading(kept, spread_of(late_s))
+    if spread is not None:
+        kept = [form for form in kept if spread.may_be(form)] or kept
+        if DelayForm.DELAYED_WINDOW in kept and spread.may_be(DelayForm.PURE):
+            kept.append(DelayForm.PURE)  # noise of the reference, too, makes a window of a mere delay
     if DelayForm.PURE in kept and DelayForm.DELAYED_WINDOW in kept:
         kept.remove(DelayForm.DELAYED_WINDOW)  # hardly told from a mere delay
     # A filter may gain by what noise it takes away: while a mere delay is not ruled out, it comes first.
@@ -200,20 +200,6 @@ def forms_kept(
         if slope <= clear_se * error:
             kept.append(form)
     return kept
-
-
-def forms_spreading(kept: Sequence[DelayForm], found: DelaySpread | None) -> list[DelayForm]:
-    """Those of ``kept`` that the spread that was found does not rule out; all where it rules out all."""
-    if found is None:
-        return list(kept)
-    least, most = found.share - SPREAD_SE * found.se, found.share + SPREAD_SE * found.se
-    left = [
-        form
-        for form in kept
-        if found.of_form[form] <= max(most, LEAST_OF_A_FILTER)
-        and (least <= found.of_form[form] + LEAST_OF_A_FILTER or form == DelayForm.ONE_POLE)
-    ]
-    return left or list(kept)
 
 
 def _along(gain: np.ndarray, fast: np.ndarray) -> tuple[float, float]:
@@ -291,6 +277,8 @@ def _told_by_latency(possible: tuple[str, ...], delay: CommonDelay, latency: Kno
     if abs(delay.seconds - latency.seconds) <= within:
         if abs(delay.seconds) <= within:
             return possible
+        if LATENCY not in possible:  # what differs from take to take may be either
+            return (LATENCY, *possible)
         left = tuple(name for name in possible if name != CLOCK)
         return (LATENCY, *(name for name in left if name != LATENCY))
     return (CLOCK,)

@@ -61,8 +61,8 @@ ALONE_LIKELIER = 20.0
 """Twice the log likelihood ratio, summed over rotations, from which on a slip alone or a recorded cause alone
 decides. Of 34 simulated gloves with a cause, looked at before and after each take that was asked for, none
 has more than 15 for the slip that is not there; of 13 that slip none more than 6 for the cause (numbers 18 to
-41 and 66 to 89 of the study's next takes). One more, which answers to changes of temperature, has 25; two that
-slip have 22 and 23 after two takes (93 and 103; 2026-11-29)."""
+41 and 66 to 89 of the study's next takes). One more, which answers to changes of temperature, has 25; two
+that slip have 22 and 23 after two takes (93 and 103; 2026-11-29)."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """A sensor that answers more or less from one moment of the session on: a film that cracked.
 
 It may be too small, or too near the end of a take, to be seen as a jump. The slopes of the takes show it: of
-what the reading has beyond its usual curve, against the angle. A glove that slips changes offsets, and no
-slopes. One change for good must explain the slopes beyond chance, and still do so beside the wearings, a
-steady drift, any recorded column and how fast the joint moved, as a sensor that is late answers less to fast
-swings. A change just where the glove was put on again may as well be of the donning: it is not named.
+what the reading has beyond its usual curve, against the angle. A glove that slips mostly changes offsets; a
+sheath that turns changes slopes while it is worn. One change for good must explain the slopes beyond chance,
+and still do so beside the wearings, a steady drift, one in each wearing, any recorded column and how fast the
+joint moved, as a sensor that is late answers less to fast swings. A change just where the glove was put on
+again may as well be of the donning: it is not named.
 """
 
 from __future__ import annotations
@@ -178,10 +179,13 @@ def _changed(takes: int, before: int, after: int) -> np.ndarray:
 
 
 def _rivals(takes: Sequence[Take], speeds: np.ndarray) -> Iterator[np.ndarray]:
-    """(T, K) of each cause that may change slopes too: the wearings, a steady drift, the ``speeds`` (T,), and
-    columns that all takes know."""
-    wearings = np.array([take.wearing for take in takes])
-    yield np.column_stack([wearings == name for name in dict.fromkeys(wearings.tolist())]).astype(float)
+    """(T, K) of each cause that may change slopes too: the wearings, alone and with a slip that goes the same
+    way in each, a steady drift, the ``speeds`` (T,), and columns that all takes know."""
+    names = [take.wearing for take in takes]
+    worn = np.array([[name == wearing for wearing in dict.fromkeys(names)] for name in names], float)
+    yield worn
+    since_donned = np.array([names[:number].count(name) for number, name in enumerate(names)])
+    yield np.column_stack([worn, _curve(since_donned)[:, :2]])
     yield np.vander(np.arange(len(takes)) / len(takes), 2)
     yield _curve(speeds)
     for name in sorted(set.intersection(*(set(take.context) for take in takes))):
