@@ -323,6 +323,30 @@ def slip_beside_known(state: State) -> State:
     return state.because("slip_beside_known", lost, sentence, findings=kept)
 
 
+def part_of_finding(state: State) -> State:
+    """One sensor fails, a glove slips as a whole: what an effect that is found at other sensors too may do to
+    this one is no finding of its own."""
+    sensor_of = own_sensors(state.question.layout, state.problem.joints)
+    lost = [
+        item
+        for item in state.findings
+        if any(
+            other.effect in item.part_of
+            and not {sensor_of.get(name, name) for name in other.where} <= {*item.where}
+            for other in state.findings
+        )
+    ]
+    if not lost:
+        return state
+    kept = tuple(item for item in state.findings if item not in lost)
+    names = list(dict.fromkeys(item.effect for item in lost))
+    wholes = list(dict.fromkeys(o.effect for o in kept if any(o.effect in item.part_of for item in lost)))
+    sentence = (
+        f"What {_listed(names)} was found by is a part of {_listed(wholes)}, found at other sensors too."
+    )
+    return state.because("part_of_finding", names, sentence, findings=kept)
+
+
 def level_rivals(state: State) -> State:
     """One pass over known angles cannot tell what is found between them from some effects: both are named."""
     naming, findings = state.naming, state.findings
@@ -552,6 +576,7 @@ RULES = (
     Rule(few_takes),
     Rule(look_for_signatures, is_evidence=True),
     Rule(slip_beside_known),
+    Rule(part_of_finding),
     Rule(level_rivals),
     Rule(finding_rivals),
     Rule(hidden_rivals),

@@ -55,6 +55,8 @@ TABLE = Relations(
     alike_between_levels=(("sensor_fault", "nonlinearity"),),
     # What sticks and lets go jumps too, and where it jumps goes along with the joint's turns.
     taken_for=(("sensor_fault", "hysteresis"),),
+    # A sheath that turns while it is worn answers less and less.
+    alike_at_several=(("sensor_fault", "garment_slip"),),
     wholes=(
         Whole(
             "garment_slip",

@@ -50,6 +50,8 @@ class Finding:
     """Effects that would seem to explain it, and are not needed beside it."""
     rivals: tuple[str, ...] = ()
     """Effects that it may be instead, where these save error on the same rotation."""
+    part_of: tuple[str, ...] = ()
+    """Effects that it is a part of, where these are found at other sensors too."""
 
 
 class Finder(Protocol):

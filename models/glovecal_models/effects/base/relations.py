@@ -82,6 +82,9 @@ class Relations:
     taken_for: tuple[tuple[str, str], ...] = ()
     """An effect that is found by its signature, and one that looks the same there: both are told where the
     second saves error on the same rotation."""
+    alike_at_several: tuple[tuple[str, str], ...] = ()
+    """An effect that is found by its signature at one sensor, and one that does the same to several: where that
+    is found at others too, it is no finding of its own."""
     wholes: tuple[Whole, ...] = ()
     remainders: tuple[Remainder, ...] = ()
     unrecorded: tuple[tuple[str, str], ...] = ()
@@ -145,6 +148,7 @@ class Relations:
         yield from self.alike
         yield from self.alike_between_levels
         yield from self.taken_for
+        yield from self.alike_at_several
         yield from ((row.effect, *row.parts) for row in self.wholes)
         yield from ((row.effect, *row.like, *row.unlike) for row in self.remainders)
         yield from ((name,) for name, _ in (*self.unrecorded, *self.of_the_base))

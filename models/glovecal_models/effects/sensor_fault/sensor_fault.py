@@ -56,6 +56,7 @@ TIMES_PER_FAULT = 4
 """A dropout has two switches; with more than so many switches, or seconds of a tone, for each other fault,
 those that are no larger are explained by them."""
 STICKS = tuple(other for found, other in TABLE.taken_for if found == "sensor_fault")
+TURNS = tuple(other for found, other in TABLE.alike_at_several if found == "sensor_fault")
 LARGEST = {"switching": 2.0, "hum": 3.0}
 """Times the mean height of the switches, or the tone's RMS, that a fault so explained reaches at most."""
 
@@ -269,7 +270,7 @@ def _finding_changed(sensor: str, rotation: str, change: GainChange, takes: Sequ
     stretches = tuple(Stretch(take.name, float(take.time_s[0]), float(take.time_s[-1])) for take in concerned)
     return Finding(
         SensorFault.name, (sensor,), sentence, kind="changed", size_deg=change.size_deg, count=1,
-        evidence=evidence, stretches=stretches,
+        evidence=evidence, stretches=stretches, part_of=TURNS,
     )  # fmt: skip
 
 
