@@ -208,6 +208,11 @@ def _between() -> Iterator[str]:
         yield f"One pass over known angles held one after another cannot tell `{found}` from `{other}`."
     for found, other in TABLE.taken_for:
         yield f"What is found of `{found}` may be `{other}`: both are told where that saves error."
+    for found, other in TABLE.alike_at_several:
+        yield (
+            f"What is found of `{found}` at one sensor and may be `{other}` is not told where that is found at"
+            " others too."
+        )
     yield WHOLES
     rows = [(f"`{row.effect}`", _names(row.parts), f"{row.share:g}", row.why) for row in TABLE.wholes]
     yield _table(("effect", "seem to explain a part of it", "share", "why"), rows)

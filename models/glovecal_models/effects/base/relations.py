@@ -83,8 +83,8 @@ class Relations:
     """An effect that is found by its signature, and one that looks the same there: both are told where the
     second saves error on the same rotation."""
     alike_at_several: tuple[tuple[str, str], ...] = ()
-    """An effect that is found by its signature at one sensor, and one that does the same to several: where that
-    is found at others too, it is no finding of its own."""
+    """An effect that is found by its signature at one sensor, and one that does the same to several: where
+    that is found at others too, it is no finding of its own."""
     wholes: tuple[Whole, ...] = ()
     remainders: tuple[Remainder, ...] = ()
     unrecorded: tuple[tuple[str, str], ...] = ()
