@@ -210,8 +210,8 @@ def _between() -> Iterator[str]:
         yield f"What is found of `{found}` may be `{other}`: both are told where that saves error."
     for found, other in TABLE.alike_at_several:
         yield (
-            f"What is found of `{found}` at one sensor and may be `{other}` is not told where that is found at"
-            " others too."
+            f"What is found of `{found}` at one sensor and may be `{other}` is not told where that is found"
+            " at others too."
         )
     yield WHOLES
     rows = [(f"`{row.effect}`", _names(row.parts), f"{row.share:g}", row.why) for row in TABLE.wholes]

@@ -12,6 +12,7 @@ from glovecal_models.diagnosis.diagnose import asked, concluded, diagnose
 from glovecal_models.diagnosis.known_effect import KnownEffect
 from glovecal_models.diagnosis.rules import RULES, states
 from glovecal_models.diagnosis.state import Choices, State
+from glovecal_models.effects.base.findings import Finding
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.layout import Layout
 from glovecal_models.simulation.causes.form import Cause
@@ -91,6 +92,25 @@ def test_a_diagnosis_ends_without_any_rule(rule: str) -> None:
     rest = replace(compared, question=replace(compared.question, without=frozenset({rule})))
     *_, last = states(rest, RULES[2:14])
     assert rule not in {item.rule for item in last.decided}
+
+
+def test_one_sensor_fails_and_a_glove_slips_as_a_whole() -> None:
+    rule = next(rule for rule in RULES if rule.name == "part_of_finding")
+    stuck = Finding("sensor_fault", ("I_MCP",), "I_MCP stands still.", kind="stuck")
+    changed = replace(stuck, sentence="I_MCP answers less.", kind="changed", part_of=("garment_slip",))
+    at_it, elsewhere = (
+        Finding("garment_slip", where, "The error wanders.") for where in (("I_MCP",), ("I_MCP", "R_MCP"))
+    )
+
+    def told(*findings: Finding) -> State:
+        return rule.apply(replace(start(), findings=findings))
+
+    for alone in ((changed,), (changed, at_it), (stuck, elsewhere)):
+        assert told(*alone).findings == alone
+    both = told(stuck, changed, elsewhere)
+    assert both.findings == (stuck, elsewhere)
+    assert both.decided[-1].effects == ("sensor_fault",)
+    assert both.decided[-1].sentence.endswith("a part of garment_slip, found at other sensors too.")
 
 
 def test_a_slip_that_alone_makes_takes_likely_leaves_nothing_for_a_column_that_goes_along() -> None:

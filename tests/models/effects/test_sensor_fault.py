@@ -192,6 +192,7 @@ def test_a_gain_that_changes_between_takes_is_a_fault_from_there_on(glove):
     [
         [1.0] * 5 + [1.08] * 5,  # just where the glove was put on again
         np.linspace(1.0, 1.1, 10),  # as the battery below
+        [1.0, 0.99, 0.96, 0.91, 0.84, 1.0, 0.99, 0.96, 0.91, 0.84],  # a sheath that turns while it is worn
         [1.0] * 10,
     ],
 )

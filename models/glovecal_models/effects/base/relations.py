@@ -202,9 +202,9 @@ CROSSED = Motion(
 )
 AIR = Motion(
     "air",
-    "Put in another battery, a full and a half-empty one in turn, but keep the glove on. Then change the air"
-    " at it: hold it in a cool box, then in a plastic bag, then in front of a fan heater; three minutes each,"
-    " and right after each 20 s of free motion. All of it three times.",
+    "Put in another battery, a full and a half-empty one in turn, or switch off and on, but keep the glove on."
+    " Then change the air at it: hold it in a cool box, then in a plastic bag, then in front of a fan heater;"
+    " three minutes each, and right after each 20 s of free motion. All of it three times.",
     180,
     9,
 )
