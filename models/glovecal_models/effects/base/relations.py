@@ -202,7 +202,7 @@ CROSSED = Motion(
 )
 AIR = Motion(
     "air",
-    "Put in another battery, a full and a half-empty one in turn, or switch off and on, but keep the glove on."
+    "Put in another battery, full and half-empty ones in turn, or switch off and on, but keep the glove on."
     " Then change the air at it: hold it in a cool box, then in a plastic bag, then in front of a fan heater;"
     " three minutes each, and right after each 20 s of free motion. All of it three times.",
     180,
