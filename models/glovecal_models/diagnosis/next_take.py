@@ -254,7 +254,13 @@ def next_take(
     declared = [(a, found) for a, b in pairs if (found := table.recording(a.name, b.name))]
     motion = next((found for item, found in declared if decides(item, found)), None)
     if motion is None and len(declared) == len(pairs):
-        return None
+        # What tells the second from the first may be another recording.
+        turned = ((table.recording(b.name, a.name), a, b) for a, b in pairs)
+        motion = next(
+            (found for found, *both in turned if found and all(decides(e, found) for e in both)), None
+        )
+        if motion is None:
+            return None
     motion = motion or _shown_by_one(known) or ANYTHING
     return asked_take(motion.name, motion.what, motion.seconds, tuple(rivals), motion.takes)
 

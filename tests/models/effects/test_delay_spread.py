@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from glovecal_models.diagnosis.next_take import next_take
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.base.relations import FAST
+from glovecal_models.effects.catalogue import effect
 from glovecal_models.effects.delay.delay_grid import delay_errors
-from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread
+from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread, shows_spread
 from glovecal_models.effects.delay.delay_verdict import common_delay, possible_delays
 from glovecal_models.effects.delay.moved_angles import FIRST_POLE_SHARE, WINDOW_SHARE, DelayForm
 from glovecal_models.layout import Layout
@@ -19,6 +23,7 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.protocol import PACE_S, Sweep
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
+from glovecal_models.takes.take import Take
 
 LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 SPREAD = {
@@ -31,11 +36,14 @@ SPREAD = {
 """The variance of each form's answer to an impulse, over the square of its mean."""
 
 
-def with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> Problem:
+def takes_with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> list[Take]:
     plan = SessionPlan(seed=seed, wearings=2, takes_per_wearing=3, take_s=25.0, rate_hz=60.0, bits=12)
     session = record_session(plan, list(causes))
-    swings = [session.also("fast", 30.0, 1, repeat=number).take for number in range(count)]
-    return DiagnosisProblem.of([*session.takes, *swings], LAYOUT, False, ()).design()
+    return [*session.takes, *(session.also("fast", 30.0, 1, repeat=number).take for number in range(count))]
+
+
+def with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> Problem:
+    return DiagnosisProblem.of(takes_with_swings(seed, causes, count), LAYOUT, False, ()).design()
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +78,34 @@ def test_a_filter_of_12_ms_is_told_from_a_mere_delay(cause, possible, ruled_out)
 def test_swings_that_keep_their_speed_tell_nothing(monkeypatch):
     monkeypatch.setattr(scene, "FAST_SLOWEST", 1.0)
     assert delay_spread(with_swings(5), 0.012) is None
+    assert not shows_spread(takes_with_swings(5))
 
 
 def test_free_motion_and_no_delay_tell_nothing(healthy):
     assert delay_spread(with_swings(5, count=0), 0.012) is None
+    assert not shows_spread(takes_with_swings(5, count=0))
     assert delay_spread(healthy, 0.0) is None
+
+
+@pytest.mark.parametrize("rate_hz", [15.0, 100.0])
+def test_what_was_recorded_is_not_asked_for_again(rate_hz):
+    plan = SessionPlan(seed=6, wearings=1, takes_per_wearing=1, take_s=30.0, rate_hz=rate_hz)
+    session = record_session(plan, [Cause("glove_latency", "common_average", 1.3)])
+    swings = session.also("fast", 30.0, 0).take
+    nowhere = replace(swings, reference=np.full_like(swings.reference, np.nan))
+    assert shows_spread([*session.takes, swings])
+    assert not shows_spread([*session.takes, nowhere])
+
+
+def test_the_other_way_round_another_recording_may_decide():
+    rivals = {name: effect(name) for name in ("lag", "hysteresis")}
+    first, then = (
+        next_take(list(rivals), rivals, decides)
+        for decides in (lambda item, motion: True, lambda item, motion: motion != FAST)
+    )
+    assert first is not None
+    assert then is not None
+    assert (first.motion, then.motion) == ("fast", "ramps")
 
 
 @pytest.mark.parametrize(

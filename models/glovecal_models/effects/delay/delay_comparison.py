@@ -22,6 +22,7 @@ from glovecal_models.effects.delay.delay_grid import (
     held_out_beside,
     why_no_delay_shows,
 )
+from glovecal_models.effects.delay.delay_spread import shows_spread
 from glovecal_models.effects.delay.delay_verdict import (
     FAST_DECIDES_S,
     ClockChoice,
@@ -44,6 +45,9 @@ class DelayComparison(EffectComparison):
 
     def first_of_alike(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
         return first_delay(problem)
+
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
+        return motion != FAST or not shows_spread(takes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +80,8 @@ class ShiftComparison(DelayComparison):
         measured = next((take.glove_latency for take in takes if take.glove_latency is not None), None)
         if motion == FAST:
             # Without a lag the clock and the glove would be left, if taps cannot tell those.
-            return abs(late_s) >= FAST_DECIDES_S and (measured is not None or taps_decide(late_s, None))
+            settles = measured is not None or taps_decide(late_s, None)
+            return settles and abs(late_s) >= FAST_DECIDES_S and super().decided_by(motion, found, takes)
         return motion != TAPS or taps_decide(late_s, measured)
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +18,14 @@ from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.delay.delay_grid import FILTERS, SHORT_ROWS, base_slope
 from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
+from glovecal_models.takes.take import Take
 
 SWINGS_PER_S = 5.0
 """RMS speed of a joint that swings, over its standard deviation in the same rows: 0.8 Hz. Free motion of
 simulated hands has 1.6."""
 SWING_SHARE = 0.4
 """Of a joint's usual deviation: less is trembling."""
+EVERY_S = 0.02
 OF_ITS_OWN = 0.1
 """Of the squares of what one pole would leave, that a gain, its change with the angle and a delay do not
 tell."""
@@ -77,16 +79,16 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     if steps < 1:
         return None
     fine: dict[int, FineAngles] = {}
-    usual = np.concatenate([take.own for take in problem.signals]).std(axis=0)
+    usual_deg = np.concatenate([take.own for take in problem.signals]).std(axis=0)
     cells = MovedCells.of(np.array(TRIED), np.full(len(TRIED), steps * STEP_S))
     products, squares = [], []
     for joint, of_joint in enumerate(problem.products):
         for unit, (take, rows) in zip(of_joint.units, problem.units(joint), strict=True):
             angle, time_s = problem.signals[take].own[rows, joint], problem.signals[take].time_s[rows]
-            if len(rows) < SHORT_ROWS or angle.std() < SWING_SHARE * usual[joint]:
+            if len(rows) < SHORT_ROWS:
                 continue
             speed = np.gradient(angle, time_s)
-            if float(np.sqrt(np.mean(speed**2))) < SWINGS_PER_S * angle.std():
+            if not _swings(angle, speed, float(usual_deg[joint])):
                 continue
             slope = base_slope(unit.base, of_joint.whole, angle)
             if take not in fine:
@@ -95,13 +97,8 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
             late, *others = *moved.read, *(moved.passed[0].T + moved.rested[0])
             left = unit.target - unit.base @ of_joint.whole - slope * (late - angle)
             spread = np.column_stack([slope * (other - late) for other in others])
-            about = (angle - angle.mean()) / angle.std()
-            known, _ = np.linalg.qr(
-                np.column_stack([np.ones_like(angle), slope * about, slope * about**2, slope * speed])
-            )
-            pole = spread[:, ONE]
-            own = pole - known @ (known.T @ pole)
-            if own @ own < OF_ITS_OWN * (pole @ pole):
+            own = _own(spread[:, ONE], angle, slope, speed)
+            if own is None:
                 continue
             starts = block_starts([len(rows)], SHORT_ROWS)
             products.append(np.add.reduceat(own * left, starts))
@@ -114,3 +111,44 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     se = float(np.linalg.norm(along - share * forms[:, ONE])) / whole
     of_form = dict(zip(TRIED, [0.0, *(forms.sum(axis=0) / whole).tolist()], strict=True))
     return DelaySpread(share, se, of_form)
+
+
+def shows_spread(takes: Sequence[Take]) -> bool:
+    """Whether a joint swings in one of them and changes its speed: another such take tells no more."""
+    window = np.hanning(SHORT_ROWS // 2)
+    for name in dict.fromkeys(name for take in takes for name in take.rotations):
+        angles = [even for take in takes if len(even := _even(take, name)) > 2 * SHORT_ROWS]
+        usual_deg = float(np.concatenate(angles).std()) if angles else 0.0
+        for angle in (np.convolve(each, window / window.sum(), "valid") for each in angles):
+            speed = np.gradient(angle, EVERY_S)
+            bend, slope = np.gradient(speed, EVERY_S), np.ones_like(angle)
+            if _swings(angle, speed, usual_deg) and _own(bend, angle, slope, speed) is not None:
+                return True
+    return False
+
+
+def _even(take: Take, rotation: str) -> np.ndarray:
+    """(N,) measured angles, ``EVERY_S`` apart; none where the joint was not measured."""
+    values = take.reference_at_frames([rotation])[:, 0]
+    known = np.isfinite(values)
+    if not known.any():
+        return np.empty(0)
+    return np.interp(np.arange(take.time_s[0], take.time_s[-1], EVERY_S), take.time_s[known], values[known])
+
+
+def _swings(angle: np.ndarray, speed: np.ndarray, usual_deg: float) -> bool:
+    """``angle`` (N,) and its ``speed``, of a joint that usually deviates by so much."""
+    deviation = float(angle.std())
+    return (
+        deviation > SWING_SHARE * usual_deg and float(np.sqrt(np.mean(speed**2))) > SWINGS_PER_S * deviation
+    )
+
+
+def _own(spread: np.ndarray, angle: np.ndarray, slope: np.ndarray, speed: np.ndarray) -> np.ndarray | None:
+    """What of ``spread`` (N,) no gain, change of gain with the angle, or delay tells; None where that is too
+    little."""
+    about = (angle - angle.mean()) / angle.std()
+    columns = np.column_stack([np.ones_like(angle), slope * about, slope * about**2, slope * speed])
+    known, _ = np.linalg.qr(columns)
+    own = spread - known @ (known.T @ spread)
+    return own if own @ own > OF_ITS_OWN * (spread @ spread) else None
