@@ -109,7 +109,8 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     whole = float(forms[:, ONE].sum())
     share = float(along.sum()) / whole
     se = float(np.linalg.norm(along - share * forms[:, ONE])) / whole
-    of_form = dict(zip(TRIED, [0.0, *(forms.sum(axis=0) / whole).tolist()], strict=True))
+    shares = [0.0, *(forms.sum(axis=0) / whole).tolist()]
+    of_form: dict[DelayForm, float] = dict(zip(TRIED, shares, strict=True))
     return DelaySpread(share, se, of_form)
 
 
