@@ -25,12 +25,11 @@ SWINGS_PER_S = 5.0
 simulated hands has 1.6."""
 SWING_SHARE = 0.4
 """Of a joint's usual deviation: less is trembling."""
-EVERY_S = 0.02
 OF_ITS_OWN = 0.1
 """Of the squares of what one pole would leave, that a gain, its change with the angle and a delay do not
 tell."""
-
-
+EVERY_S = 0.02
+"""Between even times of a whole take."""
 CLEAR_SE = 2.0
 """By so many standard errors a form has to miss what was found."""
 UNLIKE = 0.2
