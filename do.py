@@ -64,8 +64,8 @@ TOOLS = ROOT / ".tools"
 SMOKE = "--smoke"
 SIMULATED = ("tests/simulated",)
 BLENDER = ("client/blender", "tests/service/exports")
-STUDIO = ("tests/service/studio", "tests/service")
-BRIDGES = ("tests/service/bridges", "tests/service/cli", "tests/service")
+STUDIO = ("tests/service/studio", "tests/service", *SIMULATED)
+BRIDGES = ("tests/service/bridges", "tests/service/cli", "tests/service", *SIMULATED)
 SMOKE_TESTS = ("tests/models/test_layout.py", "tests/architecture/test_surroundings.py")
 PUBLIC = ("glovecal", "glovecal_client")
 PYTEST = ("python", "-I", "-m", "pytest")  # -I: packages of the user's PYTHONPATH are not those of the lock
@@ -280,14 +280,14 @@ def study(arguments: list[str]) -> int:
         beside = (*SIMULATED, "client/examples")
         return run("python", "tests/study/camera_applications.py", *arguments[1:], dev=True, beside=beside)
     if arguments[:1] == ["faults"]:
-        return run("python", "tests/study/fault_study.py", *arguments[1:], dev=True)
+        return run("python", "tests/study/fault_study.py", *arguments[1:], dev=True, beside=SIMULATED)
     if arguments[:1] == ["camera"]:
         return run("python", "tests/study/camera_study.py", *arguments[1:], beside=SIMULATED)
     return run("python", "tests/study/study.py", *arguments)
 
 
 def picture(arguments: list[str]) -> int:
-    return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=(*STUDIO, *SIMULATED))
+    return run("python", "tests/bench/studio_picture.py", *arguments, dev=True, beside=STUDIO)
 
 
 def fresh(arguments: list[str]) -> int:

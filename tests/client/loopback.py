@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+from free_ports import free_endpoint as free_endpoint
+
 from glovecal_client import Frame
 
 Value = TypeVar("Value")
-
-
-def free_endpoint() -> str:
-    """A tcp endpoint on 127.0.0.1 that nobody listens on."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
 def heard_of(published: Sequence[Frame], heard: Sequence[Frame]) -> list[Frame]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from free_ports import free_port
 from glove_logs import HARDWARE_22, LAYOUT_22
 from loopback import eventually
 from test_cyberglove_driver import in_layout_order
@@ -63,7 +64,7 @@ def pair(
     tcp: bool = False,
     udp: bool = False,
 ) -> Iterator[Pair]:
-    port_number = free_port(socket.SOCK_DGRAM if udp else socket.SOCK_STREAM)
+    port_number = free_port()
     address = str(folder / f"emulated-{name}")
     place: Port = PseudoTerminal(Path(address))
     if tcp or udp:
@@ -78,12 +79,6 @@ def pair(
     with Emulation(glove, place, chosen) as emulation:
         yield Pair(glove, emulation, device)
         device.close()
-
-
-def free_port(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as taken:
-        taken.bind(("127.0.0.1", 0))
-        return taken.getsockname()[1]
 
 
 def readings(device: Device, count: int, within_s: float = 20.0) -> list[Reading]:
@@ -382,7 +377,7 @@ class OneJoint:
 
 
 def test_a_glove_that_dials_in_is_not_kept_out_by_connections_that_say_nothing() -> None:
-    port = free_port(socket.SOCK_STREAM)
+    port = free_port()
     place = TcpPlace("127.0.0.1", port)
     with ExitStack() as strangers:
         strangers.callback(place.close)
@@ -401,7 +396,7 @@ def test_a_glove_that_dials_in_is_not_kept_out_by_connections_that_say_nothing()
 
 
 def test_a_connection_that_was_closed_again_is_no_glove() -> None:
-    port = free_port(socket.SOCK_STREAM)
+    port = free_port()
     place = TcpPlace("127.0.0.1", port)
     with pytest.raises(DeviceLost, match="no glove has connected"):
         place.open()

@@ -6,7 +6,6 @@ import base64
 import hashlib
 import hmac
 import json
-import socket
 import subprocess
 import sys
 import time
@@ -23,6 +22,7 @@ import httpx
 import jwt
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+from free_ports import free_port
 from jwt.algorithms import RSAAlgorithm
 
 CLIENT, SECRET = "glovecal", "a secret: of the provider"
@@ -31,8 +31,7 @@ CLIENT, SECRET = "glovecal", "a secret: of the provider"
 @contextmanager
 def others_provider(host: str, *people: dict[str, Any]) -> Iterator[str]:
     """oidc-provider-mock (authlib) on loopback; ``people`` are claims with ``sub``. Gives the issuer."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
+    port = free_port()
     claims = [part for each in people for part in ("--user-claims", json.dumps(each))]
     module = (sys.executable, "-I", "-m", "oidc_provider_mock", "--host", "127.0.0.1")
     process = subprocess.Popen(

@@ -6,7 +6,6 @@ import json
 import multiprocessing
 import os
 import secrets
-import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 import zenoh
+from free_ports import free_endpoint as free_endpoint
 
 from glovecal_client.capture.device import Reading
 from glovecal_client.keys import GloveKeys, all_services
@@ -50,12 +50,6 @@ M_MCP = ["M_MCP", "I_MCP"]
 """)
 
 Value = TypeVar("Value")
-
-
-def free_endpoint() -> str:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
 def eventually(condition: Callable[[], Value | None], what: str, deadline_s: float = 240.0) -> Value:

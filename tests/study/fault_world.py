@@ -8,7 +8,6 @@ import os
 import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -23,6 +22,7 @@ import httpx
 import numpy as np
 import psutil
 from fault_link import NetworkLink
+from free_ports import free_port
 
 from glovecal_client.clock import clock_ns
 from glovecal_client.errors import ClientError
@@ -48,12 +48,6 @@ SITE, SUBJECT, LAYOUT = "lab", "anna", "lucidglove"
 STARTED_WITHIN_S = 120.0
 DISK_MB = 64
 HERE = Path(__file__).resolve().parent
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def eventually(condition: Callable[[], Any], what: str, within_s: float = STARTED_WITHIN_S) -> Any:

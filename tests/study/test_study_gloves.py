@@ -143,8 +143,13 @@ def test_in_other_air_temperature_and_humidity_go_different_ways() -> None:
     cool, bag, heated = damp.reshape(2, 3).T
     assert (heated < cool).all(), "warmed air is drier"
     assert (heated < bag).all()
-    begun = [float(take.context["power_on_s"][0]) for take in (glove.takes[-1], *takes)]
-    assert begun == sorted(begun)
+    begun_s, volts = (
+        np.array([take.context[name][0] for take in takes]).reshape(2, 3)
+        for name in ("power_on_s", "supply_v")
+    )
+    assert (np.diff(begun_s, axis=1) > 0).all()
+    assert (begun_s[:, 0] < 300).all(), "switched off for another battery before each round"
+    assert abs(volts[1, 0] - volts[0, -1]) > 0.1
 
 
 def test_what_is_changed_one_at_a_time_is_changed_alone_and_goes_on() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import socket
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from cli_running import COMMAND
+from free_ports import free_endpoint
 from realtime_support import eventually
 
 from glovecal_client import Recording, open_router
@@ -25,12 +25,6 @@ from glovecal_service.emulators.catalogue import PROTOCOLS
 from glovecal_service.emulators.cyberglove3 import EmulatedCyberGlove3, card_file
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
-
-
-def free_endpoint() -> str:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{taken.getsockname()[1]}"
 
 
 @POSIX_ONLY

@@ -15,6 +15,7 @@ import httpx
 import psutil
 import pytest
 from fastapi import WebSocket
+from free_ports import free_port
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
@@ -34,8 +35,7 @@ uvicorn.Server(server_config(create_app(settings), "127.0.0.1", int(sys.argv[2])
 @pytest.fixture(scope="module")
 def process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, psutil.Process, Path]]:
     """A server in a process of its own, so that its memory can be read."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     data = tmp_path_factory.mktemp("process") / "data"
     running = subprocess.Popen([sys.executable, "-c", SERVER, str(data), str(port)])
     url = f"http://127.0.0.1:{port}"

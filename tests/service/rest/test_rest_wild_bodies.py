@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import copy
 import json
-import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
 
 import pytest
 import zenoh
+from free_ports import free_endpoint
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lawful_answers import require_lawful
@@ -46,8 +46,7 @@ WILD = settings(
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StoredService]:
     """Beside a router at which strangers answer for gloves, cameras and real time."""
     with ExitStack() as stack:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        endpoint = free_endpoint()
         router = stack.enter_context(zenoh.open(router_config((endpoint,))))
         for key, said in strangers().items():
             stack.enter_context(_answering(router, key, said))

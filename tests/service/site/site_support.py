@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 import zenoh
+from free_ports import free_port as free_port
 
 from glovecal_client.session import client_config
 from glovecal_client.site.member import Member, read_member
@@ -21,12 +21,6 @@ from glovecal_service.store.site.router import SiteRouter
 from glovecal_service.store.site.site_folder import SiteFolder
 
 BOUND = ("right",)
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
 
 
 class Site:

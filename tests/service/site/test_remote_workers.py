@@ -9,7 +9,6 @@ import asyncio
 import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import threading
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from free_ports import free_port
 from jobs_counting import CountingJob, noted
 from jobs_waiting import result_of, wait_for, wait_for_job
 from port_attack import attack
@@ -111,12 +111,6 @@ class Service:
     def stop(self) -> None:
         self.dispatcher.stop()
         self.store.close()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,7 @@ decides. Of 34 simulated gloves with a cause, looked at before and after each ta
 has more than 15 for the slip that is not there; of 13 that slip none more than 6 for the cause (numbers 18 to
 41 and 66 to 89 of the study's next takes). One more, which answers to changes of temperature, has 25; two
 that slip have 22 and 23 after two takes (93 and 103; 2026-11-29)."""
-LITTLE_BESIDE = 0.1
+CAUSE_SHARE = 0.1
 """Of the ratio that speaks for the slip alone: a cause that adds less beside it is not there. A sheath that
 turns had 6 for humidity beside it, and 189 for itself over humidity (2026-11-29)."""
 
@@ -155,8 +155,8 @@ class GarmentSlip(IntervalEffect, Hidden):
             plain = without_posture([error[:, column] for error in errors], angles)
             likelier = SlipOrCause.of(takes, plain, angles, cause.context)
             needed, instead = needed + likelier.with_cause, instead + likelier.slip_over_cause
-        needs_cause, beside = needed >= CAUSE_LIKELIER, max(CAUSE_LIKELIER, LITTLE_BESIDE * instead)
-        is_told = abs(instead) >= ALONE_LIKELIER and (needed >= beside) == (instead < 0)
+        needs_cause, enough = needed >= CAUSE_LIKELIER, max(CAUSE_LIKELIER, CAUSE_SHARE * instead)
+        is_told = abs(instead) >= ALONE_LIKELIER and (needed >= enough) == (instead < 0)
         return Weighed(needs_cause, instead > 0 if is_told else None)
 
     def proposed(self, recorded: Recorded) -> Proposal | None:

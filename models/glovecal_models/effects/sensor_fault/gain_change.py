@@ -182,10 +182,10 @@ def _rivals(takes: Sequence[Take], speeds: np.ndarray) -> Iterator[np.ndarray]:
     """(T, K) of each cause that may change slopes too: the wearings, alone and with a slip that goes the same
     way in each, a steady drift, the ``speeds`` (T,), and columns that all takes know."""
     names = [take.wearing for take in takes]
-    worn = np.array([[name == wearing for wearing in dict.fromkeys(names)] for name in names], float)
-    yield worn
+    each = np.array([[name == wearing for wearing in dict.fromkeys(names)] for name in names], float)
+    yield each
     since_donned = np.array([names[:number].count(name) for number, name in enumerate(names)])
-    yield np.column_stack([worn, _curve(since_donned)[:, :2]])
+    yield np.column_stack([each, _curve(since_donned)[:, :2]])
     yield np.vander(np.arange(len(takes)) / len(takes), 2)
     yield _curve(speeds)
     for name in sorted(set.intersection(*(set(take.context) for take in takes))):
