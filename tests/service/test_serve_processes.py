@@ -16,8 +16,9 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from free_ports import free_endpoint, free_port
 from postgres_server import PostgresServer
-from realtime_support import WireGlove, eventually, free_endpoint
+from realtime_support import WireGlove, eventually
 
 from glovecal_client.errors import NoAnswer
 from glovecal_client.keys import all_services
@@ -27,10 +28,6 @@ from glovecal_service.serve import serve
 from glovecal_service.settings import Settings
 from glovecal_service.store import data_folder_lock
 from glovecal_service.store.data_folder_lock import DataFolderLock
-
-
-def free_port() -> int:
-    return int(free_endpoint().rpartition(":")[2])
 
 
 def start(data: Path, endpoint: str, port: int, **more: str) -> subprocess.Popen[str]:
