@@ -34,6 +34,7 @@ from glovecal_models.diagnosis.unexplained_residual import UnexplainedResidual
 from glovecal_models.effects.base.effect import Effect, is_between_takes, kind_of, needs_movement
 from glovecal_models.effects.base.findings import FoundBefore
 from glovecal_models.effects.base.relations import Motion
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.catalogue import candidates
 from glovecal_models.layout import Layout
 from glovecal_models.progress import Cancel, Report, stop_if
@@ -145,7 +146,7 @@ def concluded(state: State) -> Diagnosis:
         camera=state.camera,
         decided=state.decided,
     )  # fmt: skip
-    following = _next_take(diagnosis, question.by_name, question.takes)
+    following = _next_take(diagnosis, question.by_name, state.screened.signals)
     following = following or take_to_decide(state.not_identifiable, state.residual)
     return replace(diagnosis, next_take=following)
 
@@ -165,7 +166,9 @@ def _apart_by(state: State) -> frozenset[str]:
     return frozenset(named | faint | of_model)
 
 
-def _next_take(diagnosis: Diagnosis, effects: Mapping[str, Effect], takes: Sequence[Take]) -> NextTake | None:
+def _next_take(
+    diagnosis: Diagnosis, effects: Mapping[str, Effect], takes: Sequence[Signals]
+) -> NextTake | None:
     """For what is told as the confidence set: what a signature names alone is repaired before rivals are."""
     found = {item.effect: item for item in diagnosis.naming.ranked}
     told = diagnosis.named

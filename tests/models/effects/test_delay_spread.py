@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from glovecal_models.diagnosis.next_take import next_take
 from glovecal_models.diagnosis.problem import DiagnosisProblem
 from glovecal_models.effects.base.comparison import Problem
 from glovecal_models.effects.base.relations import FAST
+from glovecal_models.effects.between import DELAYS
 from glovecal_models.effects.catalogue import effect
 from glovecal_models.effects.delay.delay_grid import delay_errors
 from glovecal_models.effects.delay.delay_spread import DelaySpread, delay_spread, shows_spread
@@ -23,7 +23,6 @@ from glovecal_models.simulation.causes.form import Cause
 from glovecal_models.simulation.protocol import PACE_S, Sweep
 from glovecal_models.simulation.session import record_session
 from glovecal_models.simulation.session_plan import FIVE_SENSORS, SessionPlan
-from glovecal_models.takes.take import Take
 
 LAYOUT = Layout.from_columns("five", FIVE_SENSORS, FIVE_SENSORS)
 SPREAD = {
@@ -36,14 +35,11 @@ SPREAD = {
 """The variance of each form's answer to an impulse, over the square of its mean."""
 
 
-def takes_with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> list[Take]:
-    plan = SessionPlan(seed=seed, wearings=2, takes_per_wearing=3, take_s=25.0, rate_hz=60.0, bits=12)
+def with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3, rate_hz: float = 60.0) -> Problem:
+    plan = SessionPlan(seed=seed, wearings=2, takes_per_wearing=3, take_s=25.0, rate_hz=rate_hz, bits=12)
     session = record_session(plan, list(causes))
-    return [*session.takes, *(session.also("fast", 30.0, 1, repeat=number).take for number in range(count))]
-
-
-def with_swings(seed: int, causes: Sequence[Cause] = (), count: int = 3) -> Problem:
-    return DiagnosisProblem.of(takes_with_swings(seed, causes, count), LAYOUT, False, ()).design()
+    swings = [session.also("fast", 30.0, 1, repeat=number).take for number in range(count)]
+    return DiagnosisProblem.of([*session.takes, *swings], LAYOUT, False, ()).design()
 
 
 @pytest.fixture(scope="module")
@@ -77,24 +73,27 @@ def test_a_filter_of_12_ms_is_told_from_a_mere_delay(cause, possible, ruled_out)
 
 def test_swings_that_keep_their_speed_tell_nothing(monkeypatch):
     monkeypatch.setattr(scene, "FAST_SLOWEST", 1.0)
-    assert delay_spread(with_swings(5), 0.012) is None
-    assert not shows_spread(takes_with_swings(5))
+    problem = with_swings(5)
+    assert delay_spread(problem, 0.012) is None
+    assert not shows_spread(problem.signals)
 
 
 def test_free_motion_and_no_delay_tell_nothing(healthy):
-    assert delay_spread(with_swings(5, count=0), 0.012) is None
-    assert not shows_spread(takes_with_swings(5, count=0))
+    problem = with_swings(5, count=0)
+    assert delay_spread(problem, 0.012) is None
+    assert not shows_spread(problem.signals)
     assert delay_spread(healthy, 0.0) is None
 
 
 @pytest.mark.parametrize("rate_hz", [15.0, 100.0])
 def test_what_was_recorded_is_not_asked_for_again(rate_hz):
-    plan = SessionPlan(seed=6, wearings=1, takes_per_wearing=1, take_s=30.0, rate_hz=rate_hz)
-    session = record_session(plan, [Cause("glove_latency", "common_average", 1.3)])
-    swings = session.also("fast", 30.0, 0).take
-    nowhere = replace(swings, reference=np.full_like(swings.reference, np.nan))
-    assert shows_spread([*session.takes, swings])
-    assert not shows_spread([*session.takes, nowhere])
+    problem = with_swings(6, [Cause("glove_latency", "common_average", 1.3)], 1, rate_hz)
+    comparisons = [comparison for name in DELAYS if (comparison := effect(name).comparison)]
+    assert len(comparisons) == len(DELAYS)
+    for comparison in comparisons:
+        found = comparison.assess(problem)
+        assert found is not None
+        assert not comparison.decided_by(FAST, found, problem.signals)
 
 
 def test_the_other_way_round_another_recording_may_decide():
@@ -128,7 +127,7 @@ def test_what_is_uncertain_rules_nothing_out_but_the_impossible():
     assert all(DelaySpread(0.5, 0.5, SPREAD).may_be(form) for form in DelayForm)
 
 
-def test_what_spreads_decides_only_between_forms_that_are_left(healthy):
+def test_without_a_delay_nobody_asks_how_it_spreads(healthy):
     grids = delay_errors(healthy)
     asked = []
 

@@ -13,7 +13,6 @@ from glovecal_models.effects.base.facts import BETWEEN_TAKES, Certainty, Control
 from glovecal_models.effects.base.limits import SignificanceLimits
 from glovecal_models.effects.base.relations import Motion
 from glovecal_models.effects.base.signals import Settings, Signals
-from glovecal_models.takes.take import Take
 
 # The regression problem that effects are judged on, as an effect with an own ``assess`` sees it.
 
@@ -101,8 +100,9 @@ class EffectComparison:
         """Those of the effect that an assessment on takes of these names found; None: none."""
         return None
 
-    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
-        """Whether ``motion`` can still tell it from a rival, given what was found in ``takes``."""
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Signals]) -> bool:
+        """Whether ``motion`` can still tell it from a rival, given what was found in ``takes``, measured and
+        smoothed as they were judged."""
         return True
 
     def consequence(self, found: Assessment, confidence_set: Sequence[str]) -> str:

@@ -162,9 +162,9 @@ NO_RELATIONS = Relations()
 
 FAST = Motion(
     "fast",
-    "Swing several fingers to and fro, about 25 degrees wide: begin slowly, get as fast as you comfortably"
-    " can within five seconds (2 to 3.5 times a second), slow down again for five, and so on; three times"
-    " 30 s, with a rest between.",
+    "Swing several fingers to and fro, about 25 degrees wide: begin slowly, speed up over five seconds to as"
+    " fast as you comfortably can (2 to 3.5 times a second), slow down again over the next five, and so on;"
+    " three times 30 s, with a rest between.",
     90,
     3,
 )
@@ -202,9 +202,9 @@ CROSSED = Motion(
 )
 AIR = Motion(
     "air",
-    "Put in another battery, full and half-empty ones in turn, or switch off and on, but keep the glove on."
-    " Then change the air at it: hold it in a cool box, then in a plastic bag, then in front of a fan heater;"
-    " three minutes each, and right after each 20 s of free motion. All of it three times.",
+    "Put in another battery, full and half-empty ones in turn, or switch off and on; the glove stays on the"
+    " hand. Then change the air at it: hold it in a cool box, then in a plastic bag, then in front of a fan"
+    " heater; three minutes each, and right after each 20 s of free motion. All of it three times.",
     180,
     9,
 )

@@ -46,7 +46,7 @@ class DelayComparison(EffectComparison):
     def first_of_alike(self, problem: Callable[[int], Problem]) -> tuple[str, tuple[str, ...]]:
         return first_delay(problem)
 
-    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Signals]) -> bool:
         return motion != FAST or not shows_spread(takes)
 
 
@@ -75,7 +75,7 @@ class ShiftComparison(DelayComparison):
     def reference_delay_s(self, found: Assessment) -> np.ndarray:
         return found.shapes[0]
 
-    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Take]) -> bool:
+    def decided_by(self, motion: Motion, found: Assessment, takes: Sequence[Signals]) -> bool:
         late_s = float(np.median(found.shapes[0]))
         measured = next((take.glove_latency for take in takes if take.glove_latency is not None), None)
         if motion == FAST:

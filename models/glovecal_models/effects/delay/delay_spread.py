@@ -16,20 +16,18 @@ import numpy as np
 
 from glovecal_models.effects.base.assessment import block_starts
 from glovecal_models.effects.base.comparison import Problem
+from glovecal_models.effects.base.signals import Signals
 from glovecal_models.effects.delay.delay_grid import FILTERS, SHORT_ROWS, base_slope
 from glovecal_models.effects.delay.moved_angles import STEP_S, DelayForm, FineAngles, MovedCells
-from glovecal_models.takes.take import Take
 
 SWINGS_PER_S = 5.0
 """RMS speed of a joint that swings, over its standard deviation in the same rows: 0.8 Hz. Free motion of
-simulated hands has 1.6."""
+simulated hands has 0.8 to 2.0 (2026-11-29)."""
 SWING_SHARE = 0.4
 """Of a joint's usual deviation: less is trembling."""
 OF_ITS_OWN = 0.1
 """Of the squares of what one pole would leave, that a gain, its change with the angle and a delay do not
 tell."""
-EVERY_S = 0.02
-"""Between even times of a whole take."""
 CLEAR_SE = 2.0
 """By so many standard errors a form has to miss what was found."""
 UNLIKE = 0.2
@@ -113,27 +111,18 @@ def delay_spread(problem: Problem, late_s: float) -> DelaySpread | None:
     return DelaySpread(share, se, of_form)
 
 
-def shows_spread(takes: Sequence[Take]) -> bool:
+def shows_spread(takes: Sequence[Signals]) -> bool:
     """Whether a joint swings in one of them and changes its speed: another such take tells no more."""
-    window = np.hanning(SHORT_ROWS // 2)
-    for name in dict.fromkeys(name for take in takes for name in take.rotations):
-        angles = [even for take in takes if len(even := _even(take, name)) > 2 * SHORT_ROWS]
-        usual_deg = float(np.concatenate(angles).std()) if angles else 0.0
-        for angle in (np.convolve(each, window / window.sum(), "valid") for each in angles):
-            speed = np.gradient(angle, EVERY_S)
-            bend, slope = np.gradient(speed, EVERY_S), np.ones_like(angle)
-            if _swings(angle, speed, usual_deg) and _own(bend, angle, slope, speed) is not None:
+    usual_deg = np.concatenate([take.own for take in takes]).std(axis=0)
+    for take in takes:
+        if len(take) < SHORT_ROWS:
+            continue
+        speeds = np.gradient(take.own, take.time_s, axis=0)
+        bends = np.gradient(speeds, take.time_s, axis=0)
+        for angle, speed, bend, usual in zip(take.own.T, speeds.T, bends.T, usual_deg, strict=True):
+            if _swings(angle, speed, usual) and _own(bend, angle, np.ones_like(angle), speed) is not None:
                 return True
     return False
-
-
-def _even(take: Take, rotation: str) -> np.ndarray:
-    """(N,) measured angles, ``EVERY_S`` apart; none where the joint was not measured."""
-    values = take.reference_at_frames([rotation])[:, 0]
-    known = np.isfinite(values)
-    if not known.any():
-        return np.empty(0)
-    return np.interp(np.arange(take.time_s[0], take.time_s[-1], EVERY_S), take.time_s[known], values[known])
 
 
 def _swings(angle: np.ndarray, speed: np.ndarray, usual_deg: float) -> bool:
